@@ -1,0 +1,38 @@
+//! Reflectance models, one file each, and what they have in common.
+//!
+//! In: pairs of unit directions in the local frame (normal +z) and parameters. Out: BRDF values in 1/sr (1/rad in the flat
+//! world), samples with their densities, basis values and derivatives for the fit. The one decision to know: a model is a
+//! sum of lobes, each with one linear weight per channel and shape parameters of its own; everything nonlinear is in the
+//! shapes, so a fit searches the shapes alone.
+
+pub mod check;
+
+use glam::DVec3;
+
+/// A reflectance function with one value per channel.
+pub trait Brdf: Send + Sync {
+    /// Number of channels.
+    fn channels(&self) -> usize;
+
+    /// Writes the value (1/sr) of every channel into `out`, whose length is [`Brdf::channels`]. 0 unless `wi` and `wo`
+    /// are both above the horizon. Returns whether the value is known: a measured table answers `false`, with zeros, for
+    /// directions outside of what was measured.
+    fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool;
+
+    /// Draws `wi` for a given `wo` from three numbers uniform in [0, 1); `None` where the draw fell below the horizon, or
+    /// `wo` is: such a draw counts as one that carries nothing.
+    fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<Sample>;
+
+    /// Density (1/sr) with which [`Brdf::sample`] draws `wi` given `wo`. It integrates to at most 1 over the upper
+    /// hemisphere, the rest being the draws that return `None`.
+    fn pdf(&self, wi: DVec3, wo: DVec3) -> f64;
+}
+
+/// A direction drawn by [`Brdf::sample`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The direction, above the horizon.
+    pub wi: DVec3,
+    /// Its density, per sr; positive.
+    pub pdf: f64,
+}

@@ -1,0 +1,3 @@
+//! The `goniofit` command.
+
+fn main() {}

@@ -1,0 +1,15 @@
+//! Measurements: the table, its weights and masks, its file formats, its use as a BRDF.
+//!
+//! In: files, or readings reduced by [`crate::gonio`]. Out: [`Measurement`], with directions in the local frame and values in
+//! 1/sr (1/rad in the flat world). The one decision to know: a masked value is stored as NaN, in its own channel, and the
+//! reasons are counted in [`Masked`]; whoever reads values asks [`Measurement::value`], which returns an `Option`.
+
+pub mod error;
+pub mod formats;
+pub mod merl_grid;
+pub mod table;
+
+pub use error::MeasurementError;
+pub use formats::{Format, Quantity, ReadOptions};
+pub use merl_grid::{MerlAngles, MerlGrid};
+pub use table::{Dimension, Directions, Masked, Measurement, Weights};
