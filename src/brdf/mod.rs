@@ -6,6 +6,19 @@
 //! shapes, so a fit searches the shapes alone.
 
 pub mod check;
+pub mod classic;
+pub mod file;
+pub mod lambert;
+pub mod lobe;
+pub mod material;
+pub mod phong;
+pub mod spec;
+
+pub use classic::PhongEquation;
+pub use file::{FitRecord, LobeRecord, MaterialError};
+pub use lobe::{Lobe, LobeKind, Parameter};
+pub use material::{LobeTerm, Material, PerChannel, Reflectance};
+pub use spec::{ModelSpec, SpecError};
 
 use glam::DVec3;
 

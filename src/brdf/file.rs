@@ -1,0 +1,271 @@
+//! The material file: JSON that every command reads and `fit` writes.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::lobe::LobeKind;
+use super::material::{LobeTerm, Material, PerChannel};
+
+const FORMAT: &str = "goniofit-material";
+const VERSION: u64 = 1;
+
+/// Why a text is no material.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaterialError {
+    /// Not JSON, or not the shape that the format prescribes.
+    #[error("not a material file: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A field holds what it must not.
+    #[error("{field}: expected {expected}, found {found}")]
+    Field {
+        /// Which field.
+        field: String,
+        /// What may stand there.
+        expected: String,
+        /// What does.
+        found: String,
+    },
+}
+
+/// How a fit went; the `fit` object of a material file. Uncertainties are one σ.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FitRecord {
+    /// `converged`, `at-bound`, `budget` or `max-iterations`.
+    pub status: String,
+    /// The loss minimised.
+    pub loss: String,
+    /// `solid-angle` or `uniform`.
+    pub weights: String,
+    /// Directions with a positive weight in at least one channel.
+    pub samples: u64,
+    /// Σ w r².
+    pub cost: f64,
+    /// √(Σ w r² / Σ w) over samples and channels.
+    pub rmse: f64,
+    /// Steps of the nonlinear search.
+    pub iterations: u64,
+    /// Time of the fit alone, s.
+    pub seconds: f64,
+    /// Standard errors, lobe by lobe; `null` where undetermined.
+    pub standard_error: Vec<LobeRecord<Option<f64>>>,
+    /// 95 % intervals, lobe by lobe; `null` where undetermined.
+    pub interval_95: Vec<LobeRecord<Option<(f64, f64)>>>,
+    /// Parameters that the data do not determine.
+    pub undetermined: Vec<String>,
+    /// What the user must know.
+    pub warnings: Vec<String>,
+}
+
+/// One number (or pair) for each parameter of a lobe.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(bound(deserialize = "T: serde::de::DeserializeOwned"))]
+pub struct LobeRecord<T> {
+    /// Of each channel's weight.
+    pub weight: Vec<T>,
+    /// Of each shape parameter, by name.
+    #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty", with = "named")]
+    pub shape: Vec<(String, PerChannel<T>)>,
+}
+
+/// Name → value pairs as a JSON object in their own order.
+mod named {
+    use super::{Deserialize, Map, PerChannel, Serialize, Value};
+    use serde::{Deserializer, Serializer, de::DeserializeOwned, de::Error as _, ser::Error as _};
+
+    pub fn serialize<T: Serialize, S: Serializer>(list: &[(String, PerChannel<T>)], s: S) -> Result<S::Ok, S::Error> {
+        let mut map = Map::new();
+        for (name, value) in list {
+            map.insert(name.clone(), serde_json::to_value(value).map_err(S::Error::custom)?);
+        }
+        map.serialize(s)
+    }
+
+    pub fn deserialize<'de, T: DeserializeOwned, D: Deserializer<'de>>(
+        d: D,
+    ) -> Result<Vec<(String, PerChannel<T>)>, D::Error> {
+        let map = Map::<String, Value>::deserialize(d)?;
+        map.into_iter().map(|(k, v)| Ok((k, serde_json::from_value(v).map_err(D::Error::custom)?))).collect()
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct File {
+    format: String,
+    version: u64,
+    model: String,
+    channels: Vec<String>,
+    lobes: Vec<FileLobe>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    fit: Option<FitRecord>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct FileLobe {
+    kind: String,
+    weight: Vec<f64>,
+    #[serde(default)]
+    shape: Option<Map<String, Value>>,
+}
+
+impl Material {
+    /// The material as the text of a material file.
+    ///
+    /// # Errors
+    /// [`MaterialError::Json`] for a number that JSON has no form for.
+    pub fn to_json(&self) -> Result<String, MaterialError> {
+        let lobes = self.lobes.iter().map(write_lobe).collect::<Result<Vec<Value>, _>>()?;
+        let mut map = Map::new();
+        map.insert("format".into(), FORMAT.into());
+        map.insert("version".into(), VERSION.into());
+        map.insert("model".into(), self.model().into());
+        map.insert("channels".into(), serde_json::to_value(&self.channels)?);
+        map.insert("lobes".into(), Value::Array(lobes));
+        if let Some(fit) = &self.fit {
+            map.insert("fit".into(), serde_json::to_value(fit)?);
+        }
+        Ok(serde_json::to_string_pretty(&map)?)
+    }
+
+    /// Reads the text of a material file. Unknown keys are ignored; lobes whose shape is `null` are dropped.
+    ///
+    /// # Errors
+    /// [`MaterialError`] naming the field, what was expected and what was found.
+    pub fn from_json(text: &str) -> Result<Self, MaterialError> {
+        // Format and version come first: a newer file may not even have the other fields.
+        let value: Value = serde_json::from_str(text)?;
+        let format = value.get("format").cloned().unwrap_or(Value::Null);
+        expect(format == FORMAT, "format", || (format!("\"{FORMAT}\""), format.to_string()))?;
+        let version = value.get("version").cloned().unwrap_or(Value::Null);
+        let known = version.as_u64().is_some_and(|v| (1..=VERSION).contains(&v));
+        expect(known, "version", || (format!("at most {VERSION}"), version.to_string()))?;
+        let file: File = serde_json::from_value(value)?;
+        let channels = file.channels.len();
+        expect(channels > 0, "channels", || ("at least one name".into(), "none".into()))?;
+        let mut lobes = Vec::new();
+        for (i, lobe) in file.lobes.into_iter().enumerate() {
+            lobes.extend(read_lobe(lobe, i, channels)?);
+        }
+        Ok(Self { channels: file.channels, lobes, fit: file.fit })
+    }
+}
+
+fn expect(holds: bool, field: &str, say: impl FnOnce() -> (String, String)) -> Result<(), MaterialError> {
+    if holds {
+        return Ok(());
+    }
+    let (expected, found) = say();
+    Err(MaterialError::Field { field: field.into(), expected, found })
+}
+
+fn write_lobe(term: &LobeTerm) -> Result<Value, MaterialError> {
+    let mut map = Map::new();
+    map.insert("kind".into(), term.kind.name().into());
+    map.insert("weight".into(), serde_json::to_value(&term.weight)?);
+    let names = term.kind.lobe().parameters();
+    if !names.is_empty() {
+        let shape = match &term.shape {
+            None => Value::Null,
+            Some(values) => {
+                let pairs = names.iter().zip(values).map(|(p, v)| Ok((p.name.to_owned(), serde_json::to_value(v)?)));
+                Value::Object(pairs.collect::<Result<_, serde_json::Error>>()?)
+            }
+        };
+        map.insert("shape".into(), shape);
+    }
+    Ok(Value::Object(map))
+}
+
+/// The lobe, or `None` where its shape is `null`.
+fn read_lobe(lobe: FileLobe, index: usize, channels: usize) -> Result<Option<LobeTerm>, MaterialError> {
+    let field = |name: &str| format!("lobes[{index}].{name}");
+    let kind = LobeKind::from_name(&lobe.kind).ok_or_else(|| MaterialError::Field {
+        field: field("kind"),
+        expected: format!("one of {}", LobeKind::ALL.map(LobeKind::name).join(", ")),
+        found: format!("\"{}\"", lobe.kind),
+    })?;
+    let right = lobe.weight.len() == channels && lobe.weight.iter().all(|w| w.is_finite());
+    expect(right, &field("weight"), || (format!("{channels} finite numbers"), format!("{:?}", lobe.weight)))?;
+    let parameters = kind.lobe().parameters();
+    let Some(values) = lobe.shape else {
+        let term = LobeTerm { kind, weight: lobe.weight, shape: Some(Vec::new()) };
+        return Ok(parameters.is_empty().then_some(term));
+    };
+    let mut shape = Vec::new();
+    for parameter in parameters {
+        let name = field(&format!("shape.{}", parameter.name));
+        let value = values.get(parameter.name).cloned().unwrap_or(Value::Null);
+        let read = serde_json::from_value::<PerChannel<f64>>(value.clone()).ok().filter(|v| match v {
+            PerChannel::Shared(x) => x.is_finite() && *x >= 0.0,
+            PerChannel::Each(list) => list.len() == channels && list.iter().all(|x| x.is_finite() && *x >= 0.0),
+        });
+        shape.push(read.ok_or_else(|| MaterialError::Field {
+            field: name,
+            expected: format!("a number ≥ 0, or {channels} of them"),
+            found: value.to_string(),
+        })?);
+    }
+    Ok(Some(LobeTerm { kind, weight: lobe.weight, shape: Some(shape) }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn material() -> Material {
+        Material::new(
+            vec!["r".into(), "g".into()],
+            vec![(LobeKind::Lambert, vec![0.1, 0.2], vec![]), (LobeKind::Phong, vec![0.3, 1.0 / 3.0], vec![312.5])],
+        )
+    }
+
+    #[test]
+    fn a_material_comes_back_from_its_file_bit_by_bit() {
+        let mut m = material();
+        m.fit = Some(FitRecord {
+            status: "converged".into(),
+            standard_error: vec![
+                LobeRecord { weight: vec![Some(1e-5), None], shape: vec![] },
+                LobeRecord {
+                    weight: vec![Some(1e-5); 2],
+                    shape: vec![("exponent".into(), PerChannel::Shared(Some(0.4)))],
+                },
+            ],
+            ..FitRecord::default()
+        });
+        let text = m.to_json().expect("json");
+        assert_eq!(Material::from_json(&text).expect("reads"), m);
+        m.lobes[1].shape = Some(vec![PerChannel::Each(vec![10.0, 20.0])]);
+        assert_eq!(Material::from_json(&m.to_json().expect("json")).expect("reads"), m);
+    }
+
+    #[test]
+    fn a_lobe_without_shape_is_dropped() {
+        let mut m = material();
+        m.lobes[1].shape = None;
+        let back = Material::from_json(&m.to_json().expect("json")).expect("reads");
+        assert_eq!(back.lobes.len(), 1);
+    }
+
+    #[test]
+    fn unknown_keys_pass_and_wrong_files_are_refused_with_the_field() {
+        let text = material().to_json().expect("json");
+        assert!(Material::from_json(&text.replacen('{', "{\"new\": 1,", 1)).is_ok());
+        for (from, to, says) in [
+            ("goniofit-material", "other", "format: expected \"goniofit-material\", found \"other\""),
+            ("\"version\": 1", "\"version\": 2", "version: expected at most 1, found 2"),
+            ("\"kind\": \"phong\"", "\"kind\": \"ward\"", "lobes[1].kind"),
+            ("312.5", "-1", "lobes[1].shape.exponent"),
+            ("312.5", "\"sharp\"", "found \"sharp\""),
+            ("312.5", "[1, 2, 3]", "lobes[1].shape.exponent"),
+            ("\"channels\": [", "\"channels\": [\"b\",", "lobes[0].weight: expected 3 finite numbers"),
+        ] {
+            let wrong = text.replacen(from, to, 1);
+            assert_ne!(wrong, text, "{from}");
+            let error = Material::from_json(&wrong).expect_err(to).to_string();
+            assert!(error.contains(says), "{error} lacks {says}");
+        }
+        assert!(Material::from_json("[]").is_err() && Material::from_json("").is_err());
+    }
+}

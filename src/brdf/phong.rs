@@ -1,0 +1,243 @@
+//! The Phong lobe as a BRDF: reciprocal, normalised to reflect `weight` at normal incidence (Phong 1975; Lewis 1994;
+//! Lafortune & Willems 1994), and its twin in the flat world.
+//!
+//! f = weight·(n + 2)/(2π)·(r·wo)ⁿ where r·wo > 0, r the mirror image of wi about the normal, else 0, for n = 0 too.
+//! Its directional albedo falls towards grazing, to weight·cosθ for large n, because part of the lobe sinks below the horizon.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::DVec3;
+
+use super::lobe::{Lobe, Parameter, above_horizon, ln_cos_alpha};
+use crate::numeric::quadrature::integrate;
+
+/// The exponent n; the fit searches this range.
+const EXPONENT: [Parameter; 1] = [Parameter { name: "exponent", unit: "1", bounds: (0.01, 1e8) }];
+
+/// The Phong lobe. Its coordinate is ln cosα.
+#[derive(Debug, Clone, Copy)]
+pub struct Phong;
+
+/// The Phong lobe of the flat world, Γ((n+3)/2)/(√π·Γ((n+2)/2))·cosⁿα.
+#[derive(Debug, Clone, Copy)]
+pub struct Phong2d;
+
+fn coordinate(wi: DVec3, wo: DVec3) -> f64 {
+    if above_horizon(wi, wo) { ln_cos_alpha(wi, wo) } else { f64::NEG_INFINITY }
+}
+
+/// cosⁿα = exp(n ln cosα); 0 where the coordinate is −∞, for n = 0 too.
+fn power(exponent: f64, ln_cos: f64) -> f64 {
+    if ln_cos == f64::NEG_INFINITY { 0.0 } else { (exponent * ln_cos).exp() }
+}
+
+impl Lobe for Phong {
+    fn name(&self) -> &'static str {
+        "phong"
+    }
+
+    fn parameters(&self) -> &'static [Parameter] {
+        &EXPONENT
+    }
+
+    fn coordinate(&self, wi: DVec3, wo: DVec3) -> f64 {
+        coordinate(wi, wo)
+    }
+
+    fn value(&self, shape: &[f64], coordinate: f64, gradient: &mut [f64]) -> f64 {
+        let n = shape[0];
+        let p = power(n, coordinate) / TAU;
+        gradient[0] = if p == 0.0 { 0.0 } else { p * (n + 2.0).mul_add(coordinate, 1.0) };
+        p * (n + 2.0)
+    }
+}
+
+impl Lobe for Phong2d {
+    fn name(&self) -> &'static str {
+        "phong2d"
+    }
+
+    fn parameters(&self) -> &'static [Parameter] {
+        &EXPONENT
+    }
+
+    fn coordinate(&self, wi: DVec3, wo: DVec3) -> f64 {
+        coordinate(wi, wo)
+    }
+
+    fn value(&self, shape: &[f64], coordinate: f64, gradient: &mut [f64]) -> f64 {
+        let n = shape[0];
+        let (norm, slope) = flat_normalization(n);
+        let p = power(n, coordinate);
+        gradient[0] = if p == 0.0 { 0.0 } else { p * norm.mul_add(coordinate, slope) };
+        p * norm
+    }
+}
+
+/// c(n) = Γ((n+3)/2)/(√π·Γ((n+2)/2)), which makes ∫ c cosⁿα cosα dα = 1 over [−π/2, π/2], and its derivative.
+fn flat_normalization(n: f64) -> (f64, f64) {
+    let x = 0.5 * (n + 2.0);
+    if x > 30.0 {
+        // Γ(x + ½)/Γ(x) = √x (1 − 1/8x + 1/128x² + 5/1024x³ − 21/32768x⁴ − 399/262144x⁵ + …), Tricomi & Erdélyi 1951
+        let y = 1.0 / x;
+        let series =
+            [1.0, -1.0 / 8.0, 1.0 / 128.0, 5.0 / 1024.0, -21.0 / 32768.0, -399.0 / 262_144.0, 869.0 / 4_194_304.0];
+        let (mut s, mut ds) = (0.0, 0.0);
+        for (k, c) in series.iter().enumerate().rev() {
+            s = s * y + c;
+            ds += -(k as f64) * c * y.powi(k as i32 + 1);
+        }
+        let root = (x / PI).sqrt();
+        return (root * s, 0.5 * (root * 0.5 * y * s + root * ds));
+    }
+    let (ln, digamma) = (statrs::function::gamma::ln_gamma, statrs::function::gamma::digamma);
+    let value = (ln(x + 0.5) - ln(x)).exp() / PI.sqrt();
+    (value, 0.5 * value * (digamma(x + 0.5) - digamma(x)))
+}
+
+/// Density (1/sr) of the directions that [`crate::geometry::sampling::cosine_power`] draws about the mirror direction.
+#[must_use]
+pub fn sampling_pdf(exponent: f64, wi: DVec3, wo: DVec3) -> f64 {
+    (exponent + 1.0) / TAU * power(exponent, ln_cos_alpha(wi, wo))
+}
+
+/// Share of the light from polar angle `theta` (rad, [0, π/2]) that a Phong lobe of weight 1 reflects, to about 1e-12;
+/// at most 1. By reciprocity also the radiance towards `theta` in a uniform surround of radiance 1.
+///
+/// Rings about the mirror direction lie wholly above the horizon up to α₀ = π/2 − θ: their part is closed,
+/// cosθ (1 − sinⁿ⁺²θ). The clipped rings' integrals over azimuth are closed too; the integral over α is left, graded towards
+/// α₀ where the integrand bends at every scale.
+#[must_use]
+pub fn directional_albedo(exponent: f64, theta: f64) -> f64 {
+    let n = exponent;
+    let (sin_t, cos_t) = theta.sin_cos();
+    let whole = if sin_t > 0.0 { -cos_t * f64::exp_m1((n + 2.0) * sin_t.ln()) } else { cos_t };
+    whole + clipped_rings(n, theta)
+}
+
+fn clipped_rings(n: f64, theta: f64) -> f64 {
+    let (sin_t, cos_t) = theta.sin_cos();
+    let start = FRAC_PI_2 - theta;
+    let end = negligible_beyond(n);
+    if sin_t <= 0.0 || end <= start {
+        return 0.0;
+    }
+    let ring = |beyond: f64| {
+        // α = start + beyond; −cos(θ + α) = sin(beyond)
+        let (sin_a, cos_a) = (start + beyond).sin_cos();
+        let cos_psi = -cos_t * cos_a;
+        let sin_psi = (beyond.sin() * (theta - start - beyond).cos()).max(0.0).sqrt();
+        let psi = sin_psi.atan2(cos_psi);
+        // sinψ was scaled by sinθ sinα: the ring is 2 [ψ cosθ cosα + sinθ sinα sinψ]
+        2.0 * (psi * cos_t * cos_a + sin_psi) * sin_a * power(n, cos_a.max(0.0).ln())
+    };
+    let total = end - start;
+    let mut width = (0.25 * start).min(0.25 * total).min(1.0 / (n + 1.0).sqrt()).max(1e-14 * total);
+    // First panel in √beyond, where sinψ starts like a root; then panels that double.
+    let mut sum = integrate(0.0, width.sqrt(), 24, |s| 2.0 * s * ring(s * s));
+    let mut low = width;
+    while low < total {
+        let high = (low + width).min(total);
+        sum += integrate(low, high, 24, ring);
+        low = high;
+        width = (2.0 * width).min(2.0 / (n + 1.0).sqrt());
+    }
+    (n + 2.0) / TAU * sum
+}
+
+/// The angle beyond which cosⁿα < e⁻⁴⁵, π/2 at most.
+fn negligible_beyond(n: f64) -> f64 {
+    let ln_cos = -45.0 / n.max(1e-300);
+    (-f64::exp_m1(2.0 * ln_cos)).sqrt().atan2(ln_cos.exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::direction;
+    use crate::numeric::quadrature::integrate_directions;
+
+    fn phong(n: f64, wi: DVec3, wo: DVec3) -> f64 {
+        Phong.value(&[n], Phong.coordinate(wi, wo), &mut [0.0])
+    }
+
+    #[test]
+    fn the_lobe_is_reciprocal() {
+        for n in [0.0, 1.0, 1e3, 1e6] {
+            for k in 0..50 {
+                let wi = direction(0.03 * f64::from(k), 0.2);
+                let wo = direction(0.03 * f64::from(k) + 1e-3, 0.2 + PI + 1e-3);
+                let (f, g) = (phong(n, wi, wo), phong(n, wo, wi));
+                assert!((f - g).abs() <= 1e-12 * f, "n {n}: {f:e} vs {g:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn directional_albedo_matches_brute_quadrature() {
+        for n in [0.0, 1.0, 7.3, 100.0] {
+            for theta in [0.0, 0.3, 0.9, 1.3, 1.5] {
+                // About the mirror direction, finely: an integral that shares nothing with the closed one.
+                let wi = direction(theta, PI);
+                let frame = crate::geometry::Frame::from_normal(direction(theta, 0.0));
+                let brute = (0..40)
+                    .map(|i| {
+                        let a = FRAC_PI_2 / 40.0;
+                        integrate_directions((a * f64::from(i), a * f64::from(i + 1)), (0.0, TAU), 300, |w| {
+                            let wo = frame.to_world(w);
+                            phong(n, wi, wo) * wo.z.max(0.0)
+                        })
+                    })
+                    .sum::<f64>();
+                let got = directional_albedo(n, theta);
+                assert!((got - brute).abs() < 3e-5, "n {n} theta {theta}: {got} vs {brute}");
+                assert!(got <= 1.0 + 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn published_albedos() {
+        // By quadrature, independently: rows n, columns cosθ = 1, .9, .75, .5, .25, .1.
+        let cosines = [1.0f64, 0.9, 0.75, 0.5, 0.25, 0.1];
+        for (n, row) in [
+            (1.0, [1.0, 0.90954, 0.78800, 0.60900, 0.45331, 0.36990]),
+            (10.0, [1.0, 0.90000, 0.75011, 0.50474, 0.28496, 0.17916]),
+            (100.0, [1.0, 0.9, 0.75, 0.5, 0.25017, 0.10821]),
+            (1000.0, [1.0, 0.9, 0.75, 0.5, 0.25, 0.10001]),
+        ] {
+            for (c, want) in cosines.iter().zip(row) {
+                let got = directional_albedo(n, c.acos());
+                assert!((got - want).abs() <= 6e-6, "n {n} cos {c}: {got} vs {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_flat_lobe_conserves_energy_at_normal_incidence() {
+        for n in [0.0, 0.5, 3.0, 57.9, 58.1, 1e3, 1e6, 1e8] {
+            let end = negligible_beyond(n);
+            let (norm, slope) = flat_normalization(n);
+            let panels = 64;
+            let sum: f64 = (0..panels)
+                .map(|i| {
+                    let (a, b) = (end * f64::from(i) / f64::from(panels), end * f64::from(i + 1) / f64::from(panels));
+                    integrate(a, b, 20, |t| 2.0 * norm * power(n, f64::ln_1p(-2.0 * (0.5 * t).sin().powi(2))) * t.cos())
+                })
+                .sum();
+            assert!((sum - 1.0).abs() < 1e-10, "n {n}: {sum}");
+            let h = 1e-5 * (n + 1.0);
+            let difference =
+                (flat_normalization(n + h).0 - flat_normalization((n - h).max(0.0)).0) / (h + n - (n - h).max(0.0));
+            assert!((slope / difference - 1.0).abs() < 3e-5, "n {n}: {slope:e} vs {difference:e}");
+        }
+    }
+
+    #[test]
+    fn zero_for_any_exponent_where_the_mirror_direction_is_behind() {
+        let (wi, wo) = (direction(1.2, 0.0), direction(1.2, 0.3));
+        assert_eq!(phong(0.0, wi, wo), 0.0);
+        assert_eq!(phong(0.0, DVec3::Z, -DVec3::Z), 0.0);
+        assert_eq!(phong(5.0, DVec3::X, DVec3::Z), 0.0);
+    }
+}
