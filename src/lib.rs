@@ -4,6 +4,8 @@
 
 pub mod brdf;
 pub mod control;
+pub mod fit;
 pub mod geometry;
+pub mod gonio;
 pub mod measurement;
 pub mod numeric;

@@ -1,0 +1,151 @@
+//! From the solver's numbers to the material and its record.
+
+use super::covariance::Uncertainty;
+use super::options::{FitOptions, WeightMode};
+use super::solver::{Outcome, Stop};
+use super::varpro::{Profile, Solution};
+use crate::brdf::{FitRecord, LobeRecord, LobeTerm, Material, PerChannel};
+use crate::measurement::Measurement;
+
+/// All that a record is made of.
+pub(super) struct Facts<'a> {
+    pub measurement: &'a Measurement,
+    pub options: &'a FitOptions,
+    pub problem: &'a Profile<'a>,
+    pub solution: &'a Solution,
+    pub uncertainty: &'a Uncertainty,
+    pub outcome: &'a Outcome,
+    pub seconds: f64,
+}
+
+/// One lobe of the result, before lobes of one kind are put in order.
+struct Row {
+    term: LobeTerm,
+    error: LobeRecord<Option<f64>>,
+    interval: LobeRecord<Option<(f64, f64)>>,
+}
+
+/// The fitted material with its record.
+pub(super) fn material(facts: &Facts<'_>) -> Material {
+    let mut rows: Vec<Row> = (0..facts.problem.kinds.len()).map(|l| facts.row(l)).collect();
+    sort_lobes_of_one_kind(&mut rows);
+    let samples = facts.problem.samples;
+    let mut record = FitRecord {
+        status: facts.status().into(),
+        loss: facts.options.loss.name().into(),
+        weights: if samples.solid_angle { WeightMode::SolidAngle } else { WeightMode::Uniform }.name().into(),
+        samples: samples.len() as u64,
+        cost: facts.solution.cost,
+        rmse: (facts.solution.cost / samples.residuals().max(1) as f64).sqrt(),
+        iterations: facts.outcome.history.len().saturating_sub(1) as u64,
+        seconds: facts.seconds,
+        undetermined: undetermined(&rows, &facts.measurement.channels),
+        ..FitRecord::default()
+    };
+    record.warnings = facts.warnings(&record);
+    let mut lobes = Vec::new();
+    for row in rows {
+        lobes.push(row.term);
+        record.standard_error.push(row.error);
+        record.interval_95.push(row.interval);
+    }
+    Material { channels: facts.measurement.channels.clone(), lobes, fit: Some(record) }
+}
+
+impl Facts<'_> {
+    fn row(&self, l: usize) -> Row {
+        let kind = self.problem.kinds[l];
+        let q = self.uncertainty.quantile;
+        let weight: Vec<f64> = self.solution.weights.iter().map(|x| x[l]).collect();
+        let dark = weight.iter().all(|w| *w == 0.0);
+        let errors: Vec<Option<f64>> = self.uncertainty.weights.iter().map(|e| e[l]).collect();
+        // A weight is never negative, so neither is its interval.
+        let around = |(w, e): (&f64, &Option<f64>)| e.map(|e| ((w - q * e).max(0.0), w + q * e));
+        let mut row = Row {
+            error: LobeRecord { weight: errors.clone(), shape: Vec::new() },
+            interval: LobeRecord { weight: weight.iter().zip(&errors).map(around).collect(), shape: Vec::new() },
+            term: LobeTerm { kind, weight, shape: None },
+        };
+        let mut shape = Vec::new();
+        for (i, (_, parameter)) in self.problem.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l) {
+            let value = self.solution.t[i].exp();
+            let error = if dark { None } else { self.uncertainty.ln_shapes[i] };
+            shape.push(PerChannel::Shared(value));
+            row.error.shape.push((parameter.name.into(), PerChannel::Shared(error.map(|e| e * value))));
+            let interval = error.map(|e| (value * (-q * e).exp(), value * (q * e).exp()));
+            row.interval.shape.push((parameter.name.into(), PerChannel::Shared(interval)));
+        }
+        if !(dark && !shape.is_empty()) {
+            row.term.shape = Some(shape);
+        }
+        row
+    }
+
+    fn status(&self) -> &'static str {
+        let bounds = self.problem.bounds();
+        let ends = self.solution.t.iter().zip(&bounds).any(|(t, (low, high))| t <= low || t >= high);
+        match self.outcome.stop {
+            Stop::MaxIterations => "max-iterations",
+            _ if ends && self.lit() => "at-bound",
+            _ => "converged",
+        }
+    }
+
+    /// Whether any lobe with a shape has a weight.
+    fn lit(&self) -> bool {
+        self.problem.layout.iter().any(|(l, _)| self.solution.weights.iter().any(|x| x[*l] > 0.0))
+    }
+
+    fn warnings(&self, record: &FitRecord) -> Vec<String> {
+        let mut list = Vec::new();
+        if !record.undetermined.is_empty() {
+            list.push(format!("the data do not determine {}", record.undetermined.join(", ")));
+        }
+        if record.status == "at-bound" {
+            list.push(
+                "a shape parameter ended at the end of its range: the data ask for more than the model has".into(),
+            );
+        }
+        if record.status == "max-iterations" {
+            list.push("the search used up its steps before it converged".into());
+        }
+        if self.options.weights == WeightMode::SolidAngle && !self.problem.samples.solid_angle {
+            list.push("the measurement has no grid, so every sample counts the same (uniform weights)".into());
+        }
+        for (channel, _) in self.measurement.channels.iter().zip(&self.problem.samples.counts).filter(|(_, n)| **n == 0)
+        {
+            list.push(format!("channel {channel} has no valid sample"));
+        }
+        list
+    }
+}
+
+/// Lobes of one kind by ascending mean exponent, at the places that the model gives to their kind; dark ones last.
+fn sort_lobes_of_one_kind(rows: &mut [Row]) {
+    let key = |row: &Row| {
+        let shape = row.term.shape_of(0).unwrap_or_else(|| vec![f64::INFINITY]);
+        shape.first().copied().unwrap_or(0.0)
+    };
+    for i in 0..rows.len() {
+        for j in i + 1..rows.len() {
+            if rows[i].term.kind == rows[j].term.kind && key(&rows[j]) < key(&rows[i]) {
+                rows.swap(i, j);
+            }
+        }
+    }
+}
+
+/// Names of the parameters without a standard error: `phong.exponent`, `lambert.weight[g]`, `phong[1].exponent`.
+fn undetermined(rows: &[Row], channels: &[String]) -> Vec<String> {
+    let mut names = Vec::new();
+    for (l, row) in rows.iter().enumerate() {
+        let before = rows[..l].iter().filter(|r| r.term.kind == row.term.kind).count();
+        let lobe =
+            if before == 0 { row.term.kind.name().to_owned() } else { format!("{}[{before}]", row.term.kind.name()) };
+        let open = row.error.weight.iter().zip(channels).filter(|(e, _)| e.is_none());
+        names.extend(open.map(|(_, c)| format!("{lobe}.weight[{c}]")));
+        let open = row.error.shape.iter().filter(|(_, e)| *e == PerChannel::Shared(None));
+        names.extend(open.map(|(name, _)| format!("{lobe}.{name}")));
+    }
+    names
+}

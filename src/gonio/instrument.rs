@@ -1,0 +1,116 @@
+//! The instrument: what a reading of a known BRDF comes out as.
+
+use rand_distr::{Distribution, Normal, Poisson};
+
+use crate::numeric::random::{Purpose, stream};
+
+/// An ideal gonioreflectometer with a noisy detector.
+///
+/// The source lights a spot on the sample, the detector sees all of it: the flux it receives is ∝ f·cosθo, and so is the mean
+/// number of photoelectrons, N = f·cosθo·`electrons`. Photoelectrons are Poisson-distributed (shot noise); the electronics add
+/// normal noise of `read_noise` electrons to each reading. The BRDF comes back as signal/(cosθo·`electrons`).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Instrument {
+    /// Photoelectrons in one reading of a BRDF of 1/sr at cosθo = 1; 0 means a detector without noise.
+    pub electrons: f64,
+    /// Standard deviation of the electronics' noise in one reading, electrons.
+    pub read_noise: f64,
+    /// Readings averaged at each pair of directions.
+    pub readings: u32,
+}
+
+impl Default for Instrument {
+    /// A cooled detector at a bright source: 10⁵ electrons per 1/sr, 10 electrons of read noise, one reading.
+    fn default() -> Self {
+        Self { electrons: 1e5, read_noise: 10.0, readings: 1 }
+    }
+}
+
+impl Instrument {
+    /// Without any noise: readings are the truth.
+    #[must_use]
+    pub fn noiseless() -> Self {
+        Self { electrons: 0.0, read_noise: 0.0, readings: 1 }
+    }
+
+    /// Whether the detector adds noise.
+    #[must_use]
+    pub fn is_noisy(&self) -> bool {
+        self.electrons > 0.0
+    }
+
+    /// What is wrong with the numbers, if anything.
+    #[must_use]
+    pub fn fault(&self) -> Option<String> {
+        let said = |name: &str, range: &str, found: f64| Some(format!("{name}: expected {range}, found {found}"));
+        if !(self.electrons >= 0.0 && self.electrons <= 1e15) {
+            return said("instrument.electrons", "a number from 0 (no noise) to 1e15", self.electrons);
+        }
+        if !(self.read_noise >= 0.0 && self.read_noise.is_finite()) {
+            return said("instrument.read_noise", "a finite number ≥ 0", self.read_noise);
+        }
+        (self.readings == 0).then(|| "instrument.readings: expected at least 1, found 0".to_owned())
+    }
+
+    /// One reduced reading (f, σ) of the true value `f` (1/sr) at cosθo = `cos_o` > 0. σ is what an experimenter would state: shot
+    /// noise estimated from the reading itself (at least one electron's worth), read noise as specified.
+    #[must_use]
+    pub fn read(&self, f: f64, cos_o: f64, seed: u64, index: u64) -> (f64, f64) {
+        if !self.is_noisy() {
+            return (f, 0.0);
+        }
+        let gain = self.electrons * cos_o;
+        let readings = f64::from(self.readings);
+        // Poisson counts of several readings add up to one Poisson count.
+        let signal = shot(f * gain * readings, seed, index) + self.read_noise * readings.sqrt() * normal(seed, index);
+        let variance = signal.max(1.0) + self.read_noise * self.read_noise * readings;
+        (signal / (gain * readings), variance.sqrt() / (gain * readings))
+    }
+}
+
+fn shot(mean: f64, seed: u64, index: u64) -> f64 {
+    // A negative mean (a table's noise as the truth) has no photons.
+    Poisson::new(mean).map_or(0.0, |p| p.sample(&mut stream(seed, Purpose::ShotNoise, index)))
+}
+
+fn normal(seed: u64, index: u64) -> f64 {
+    Normal::new(0.0, 1.0).map_or(0.0, |n| n.sample(&mut stream(seed, Purpose::ReadNoise, index)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_scatter_round_the_truth_by_the_sigma_they_state() {
+        for (f, electrons, readings) in [(0.2, 1e5, 1), (5.0, 1e4, 4), (1e-3, 1e4, 1), (0.0, 1e4, 2)] {
+            let instrument = Instrument { electrons, read_noise: 20.0, readings };
+            let (cos_o, draws) = (0.5, 20_000u64);
+            let gain = electrons * cos_o * f64::from(readings);
+            let truth = (f * gain + 400.0 * f64::from(readings)).sqrt() / gain;
+            let all: Vec<(f64, f64)> = (0..draws).map(|i| instrument.read(f, cos_o, 9, i)).collect();
+            let n = draws as f64;
+            let mean = all.iter().map(|r| r.0).sum::<f64>() / n;
+            assert!((mean - f).abs() < 5.0 * truth / n.sqrt(), "mean {mean} vs {f}");
+            let variance = all.iter().map(|r| (r.0 - f).powi(2)).sum::<f64>() / n;
+            // A variance of n normal draws scatters by √(2/n).
+            assert!((variance / truth.powi(2) - 1.0).abs() < 6.0 * (2.0 / n).sqrt(), "f {f}: {variance}");
+            let stated = all.iter().map(|r| r.1 * r.1).sum::<f64>() / n;
+            // Never less than the truth on average; the floor of one electron adds at most a share of read noise.
+            assert!(
+                stated > truth * truth * 0.98 && stated < truth * truth * 1.05,
+                "f {f}: {stated} vs {}",
+                truth * truth
+            );
+        }
+    }
+
+    #[test]
+    fn without_noise_the_reading_is_the_truth_and_wrong_numbers_are_named() {
+        assert_eq!(Instrument::noiseless().read(0.37, 0.2, 1, 2), (0.37, 0.0));
+        assert_eq!(Instrument::default().fault(), None);
+        let wrong = Instrument { read_noise: -1.0, ..Instrument::default() };
+        assert!(wrong.fault().is_some_and(|f| f.contains("read_noise") && f.contains("-1")));
+    }
+}

@@ -1,0 +1,198 @@
+//! Where the instrument measures: pairs of directions, with the solid angle that each stands for.
+
+use std::fmt;
+use std::str::FromStr;
+
+use glam::DVec3;
+
+use crate::geometry::angles::direction_deg;
+use crate::geometry::grid::polar_cells;
+use crate::measurement::{Dimension, Directions, MerlGrid, Weights};
+
+/// A scan.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scan {
+    /// The detector moves in the plane of incidence, θo from −85° to 85° every `step_deg`, for incidences 0°, 15°, … 75°.
+    InPlane {
+        /// Step of θo, degrees.
+        step_deg: f64,
+    },
+    /// Incidences θi = 0, s, 2s … and the whole hemisphere of θo, φo, with s = `step_deg`, all below 90°.
+    Hemisphere {
+        /// Step of every angle, degrees.
+        step_deg: f64,
+    },
+    /// The 90 × 90 × 180 grid of a MERL table, read at bin centres.
+    Merl,
+    /// The flat world: θi and θo from −85° to 85° every `step_deg`.
+    Flat {
+        /// Step of both angles, degrees.
+        step_deg: f64,
+    },
+    /// Directions and weights of another measurement.
+    List {
+        /// What it is called.
+        name: String,
+        /// The directions.
+        directions: Directions,
+        /// Their weights.
+        weights: Weights,
+        /// Flat world or space.
+        dimension: Dimension,
+    },
+}
+
+/// Why a text is no scan.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "scan \"{text}\": expected in-plane[:STEP], hemisphere[:STEP], flat[:STEP] (STEP in degrees, 0.1 to 45), merl or list:FILE"
+)]
+pub struct ScanError {
+    text: String,
+}
+
+impl FromStr for Scan {
+    type Err = ScanError;
+
+    fn from_str(text: &str) -> Result<Self, ScanError> {
+        let wrong = || ScanError { text: text.to_owned() };
+        let (kind, step) = text.split_once(':').map_or((text, None), |(k, s)| (k, Some(s)));
+        let step = |default: f64| match step {
+            None => Ok(default),
+            Some(s) => s.parse::<f64>().ok().filter(|v| (0.1..=45.0).contains(v)).ok_or_else(wrong),
+        };
+        match kind {
+            "in-plane" => Ok(Self::InPlane { step_deg: step(1.0)? }),
+            "hemisphere" => Ok(Self::Hemisphere { step_deg: step(5.0)? }),
+            "flat" => Ok(Self::Flat { step_deg: step(1.0)? }),
+            "merl" if text == "merl" => Ok(Self::Merl),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+impl fmt::Display for Scan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::InPlane { step_deg } => write!(f, "in-plane:{step_deg}"),
+            Self::Hemisphere { step_deg } => write!(f, "hemisphere:{step_deg}"),
+            Self::Flat { step_deg } => write!(f, "flat:{step_deg}"),
+            Self::Merl => f.write_str("merl"),
+            Self::List { name, .. } => write!(f, "list:{name}"),
+        }
+    }
+}
+
+/// Most entries a scan may have: 64 million pairs are 3 GB of directions.
+const MOST: f64 = 64e6;
+
+impl Scan {
+    /// Flat world or space.
+    #[must_use]
+    pub fn dimension(&self) -> Dimension {
+        match self {
+            Self::Flat { .. } => Dimension::Flat,
+            Self::List { dimension, .. } => *dimension,
+            _ => Dimension::Space,
+        }
+    }
+
+    /// The pairs of directions and what each stands for; `None` where the step asks for more than 64 million.
+    #[must_use]
+    pub fn directions(&self) -> Option<(Directions, Weights)> {
+        match self {
+            Self::InPlane { step_deg } => {
+                let incidences: Vec<f64> = (0..6).map(|k| 15.0 * f64::from(k)).collect();
+                Some((plane_pairs(&incidences, &symmetric_steps(*step_deg)), Weights::Uniform))
+            }
+            Self::Flat { step_deg } => {
+                let angles = symmetric_steps(*step_deg);
+                Some((plane_pairs(&angles, &angles), Weights::Uniform))
+            }
+            Self::Hemisphere { step_deg } => hemisphere(*step_deg),
+            Self::Merl => Some((Directions::Merl(MerlGrid::default()), Weights::Merl)),
+            Self::List { directions, weights, .. } => Some((directions.clone(), weights.clone())),
+        }
+    }
+}
+
+/// −85° … 85° in steps, 0 among them.
+fn symmetric_steps(step_deg: f64) -> Vec<f64> {
+    let most = (85.0 / step_deg + 1e-9).floor() as i64;
+    (-most..=most).map(|k| k as f64 * step_deg).collect()
+}
+
+/// Pairs in the xz plane. A positive θi points to +x; a positive θo to −x, the side of the mirror direction.
+fn plane_pairs(incidences_deg: &[f64], detector_deg: &[f64]) -> Directions {
+    let (mut wi, mut wo) = (Vec::new(), Vec::new());
+    for i in incidences_deg {
+        for o in detector_deg {
+            wi.push(direction_deg(*i, 0.0));
+            wo.push(direction_deg(*o, 180.0));
+        }
+    }
+    Directions::List { wi, wo }
+}
+
+/// θi at azimuth 180°, so that the mirror direction lies at φo = 0.
+fn hemisphere(step_deg: f64) -> Option<(Directions, Weights)> {
+    let polar = ((90.0 - 1e-9) / step_deg).floor() as usize;
+    let around = (360.0 / step_deg).round().max(1.0) as usize;
+    if ((polar + 1) as f64).powi(2) * around as f64 > MOST {
+        return None;
+    }
+    let theta_deg: Vec<f64> = (0..=polar).map(|k| k as f64 * step_deg).collect();
+    let cells = polar_cells(&theta_deg.iter().map(|t| t.to_radians()).collect::<Vec<_>>());
+    let (mut wi, mut wo, mut weight) = (Vec::new(), Vec::new(), Vec::new());
+    let mut push = |i: DVec3, o: DVec3, w: f64| {
+        wi.push(i);
+        wo.push(o);
+        weight.push(w);
+    };
+    for (ti, cell_i) in theta_deg.iter().zip(&cells) {
+        let i = direction_deg(*ti, 180.0);
+        for (to, cell_o) in theta_deg.iter().zip(&cells) {
+            // The pole is one direction: it stands for its whole cap.
+            let columns = if *to == 0.0 { 1 } else { around };
+            for k in 0..columns {
+                push(i, direction_deg(*to, 360.0 * k as f64 / around as f64), cell_i * cell_o / columns as f64);
+            }
+        }
+    }
+    Some((Directions::List { wi, wo }, Weights::SolidAngle(weight)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::mirror;
+
+    #[test]
+    fn names_read_back_and_wrong_ones_say_what_is_known() {
+        for text in ["in-plane:2", "hemisphere:7.5", "merl", "flat:1"] {
+            assert_eq!(text.parse::<Scan>().expect(text).to_string(), text);
+        }
+        for text in ["sphere", "merl:3", "hemisphere:0", "hemisphere:NaN", "in-plane:-1", ""] {
+            assert!(text.parse::<Scan>().expect_err(text).to_string().contains("hemisphere[:STEP]"));
+        }
+    }
+
+    #[test]
+    fn a_hemisphere_scan_s_weights_add_up_to_both_hemispheres() {
+        let (directions, weights) = Scan::Hemisphere { step_deg: 10.0 }.directions().expect("small");
+        let sum: f64 = (0..directions.len()).map(|i| weights.get(i)).sum();
+        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+        assert_eq!(directions.len(), 9 * (1 + 8 * 36));
+        assert!(Scan::Hemisphere { step_deg: 0.1 }.directions().is_none());
+    }
+
+    #[test]
+    fn in_plane_scans_meet_the_mirror_direction() {
+        let (directions, _) = Scan::InPlane { step_deg: 1.0 }.directions().expect("small");
+        let met = (0..directions.len()).filter(|&i| {
+            let (wi, wo) = directions.pair(i);
+            (mirror(wi) - wo).length() < 1e-12
+        });
+        assert_eq!(met.count(), 6);
+    }
+}

@@ -1,0 +1,117 @@
+//! The forward simulation: truth, instrument and scan to a measurement.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::instrument::Instrument;
+use super::scan::Scan;
+use crate::control::Control;
+use crate::measurement::{Masked, Measurement};
+use crate::numeric::sum::BLOCK;
+
+/// The material on the sample holder: writes the value of every channel for (wi, wo) above the horizon, in 1/sr (1/rad in the
+/// flat world, directions in the xz plane), and answers whether it is known there.
+pub type Truth<'a> = dyn Fn(DVec3, DVec3, &mut [f64]) -> bool + Sync + 'a;
+
+/// Measures a material with channels of these names by an instrument along a scan. Directions below the horizon, and those
+/// where the truth is not known, are masked. `None` where the scan has too many entries.
+pub fn simulate(
+    name: &str,
+    truth: &Truth<'_>,
+    channels: &[String],
+    instrument: &Instrument,
+    scan: &Scan,
+    seed: u64,
+    control: Control<'_>,
+) -> Option<Measurement> {
+    let (directions, weights) = scan.directions()?;
+    let (n, width) = (directions.len(), channels.len());
+    control.progress.start("measuring", n as u64);
+    let blocks: Vec<(Vec<f64>, Vec<f64>)> = (0..n.div_ceil(BLOCK))
+        .into_par_iter()
+        .map(|b| {
+            let range = b * BLOCK..((b + 1) * BLOCK).min(n);
+            let len = range.len();
+            let (mut values, mut sigma) = (vec![f64::NAN; len * width], vec![f64::NAN; len * width]);
+            let mut f = vec![0.0; width];
+            for (slot, i) in range.enumerate() {
+                let (wi, wo) = directions.pair(i);
+                if wi.z > 0.0 && wo.z > 0.0 && truth(wi, wo, &mut f) {
+                    for (c, f) in f.iter().enumerate() {
+                        let reading = instrument.read(*f, wo.z, seed, (i * width + c) as u64);
+                        (values[c * len + slot], sigma[c * len + slot]) = reading;
+                    }
+                }
+            }
+            control.progress.advance(len as u64);
+            (values, sigma)
+        })
+        .collect();
+    control.progress.finish();
+    let values = join_planes(width, blocks.iter().map(|b| &b.0));
+    let marked = values.iter().filter(|v| v.is_nan()).count() as u64;
+    let sigma = instrument.is_noisy().then(|| join_planes(width, blocks.iter().map(|b| &b.1)));
+    Some(Measurement {
+        origin: format!("simulated, scan {scan}, seed {seed}"),
+        dimension: scan.dimension(),
+        weights,
+        masked: Masked { marked, ..Masked::default() },
+        sigma,
+        ..Measurement::new(name, directions, channels.to_vec(), values)
+    })
+}
+
+/// Channel-major blocks joined to channel-major planes.
+fn join_planes<'a>(width: usize, blocks: impl Iterator<Item = &'a Vec<f64>> + Clone) -> Vec<f64> {
+    let plane = |c: usize| {
+        blocks.clone().flat_map(move |b| {
+            let len = b.len() / width;
+            b[c * len..(c + 1) * len].iter().copied()
+        })
+    };
+    (0..width).flat_map(plane).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{LobeKind, Material};
+
+    fn measure(threads: usize, instrument: &Instrument, scan: &Scan) -> Measurement {
+        let material = Material::new(
+            vec!["a".into(), "b".into()],
+            vec![(LobeKind::Lambert, vec![0.3, 0.5], vec![]), (LobeKind::Phong, vec![0.1, 0.2], vec![30.0])],
+        );
+        let truth = |wi, wo, out: &mut [f64]| {
+            out.copy_from_slice(&material.value(wi, wo));
+            true
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
+        let channels = material.channels.clone();
+        pool.install(|| simulate("m", &truth, &channels, instrument, scan, 5, Control::silent()).expect("fits"))
+    }
+
+    #[test]
+    fn readings_have_the_same_bits_from_any_number_of_threads() {
+        let scan = Scan::Hemisphere { step_deg: 10.0 };
+        let bits = |m: &Measurement| m.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let one = measure(1, &Instrument::default(), &scan);
+        assert_eq!(bits(&one), bits(&measure(2, &Instrument::default(), &scan)));
+        assert_eq!(bits(&one), bits(&measure(8, &Instrument::default(), &scan)));
+    }
+
+    #[test]
+    fn a_noiseless_instrument_reads_the_truth_above_the_horizon_and_masks_the_rest() {
+        let m = measure(2, &Instrument::noiseless(), &Scan::Merl);
+        assert!(m.sigma.is_none());
+        let above = (0..m.len()).filter(|&i| {
+            let (wi, wo) = m.directions.pair(i);
+            wi.z > 0.0 && wo.z > 0.0
+        });
+        assert_eq!(m.masked.total() as usize, 2 * (m.len() - above.count()));
+        let (wi, wo) = m.directions.pair(1000);
+        let peak = 0.5 / std::f64::consts::PI
+            + 0.2 * 32.0 / std::f64::consts::TAU * crate::geometry::half_diff::cos_alpha(wi, wo).powi(30);
+        assert!((m.value(1, 1000).expect("valid") / peak - 1.0).abs() < 1e-12);
+    }
+}
