@@ -1,7 +1,11 @@
-//! What runs through the whole house: progress reports and the wish to stop.
+//! What runs through the whole house: progress reports, the wish to stop, output files.
 //!
-//! In: nothing. Out: the two small types that any long work takes. A library caller who wants neither passes
+//! In: nothing. Out: the two small types that any long work takes, and the one way to write a file. A library caller who wants neither passes
 //! [`Control::silent`]; the command line passes a progress bar and a flag that Ctrl-C sets.
+
+mod files;
+
+pub use files::write_whole;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

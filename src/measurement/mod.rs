@@ -7,9 +7,11 @@
 pub mod error;
 pub mod formats;
 pub mod merl_grid;
+pub mod summary;
 pub mod table;
 
 pub use error::MeasurementError;
 pub use formats::{Format, Quantity, ReadOptions};
 pub use merl_grid::{MerlAngles, MerlGrid};
+pub use summary::Summary;
 pub use table::{Dimension, Directions, Masked, Measurement, Weights};

@@ -79,6 +79,16 @@ impl Weights {
         }
     }
 
+    /// What they stand for, in a word.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::SolidAngle(_) | Self::Merl => "solid angle of the grid",
+            Self::Column(_) => "the file's weight column",
+        }
+    }
+
     /// Whether the weights know of a grid (anything but [`Weights::Uniform`]).
     #[must_use]
     pub fn known(&self) -> bool {
