@@ -86,17 +86,24 @@ impl Material {
     #[must_use]
     pub fn value(&self, wi: DVec3, wo: DVec3) -> Vec<f64> {
         let mut out = vec![0.0; self.channels.len()];
+        self.write_value(wi, wo, &mut out);
+        out
+    }
+
+    /// Writes [`Material::value`] into `out`, one number a channel.
+    pub fn write_value(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) {
+        out.fill(0.0);
         for term in &self.lobes {
             let lobe = term.kind.lobe();
             let coordinate = lobe.coordinate(wi, wo);
-            let mut gradient = vec![0.0; lobe.parameters().len()];
+            let mut gradient = [0.0; 4];
+            let gradient = &mut gradient[..lobe.parameters().len()];
             for (c, value) in out.iter_mut().enumerate() {
                 if let Some(shape) = term.shape_of(c) {
-                    *value += term.weight[c] * lobe.value(&shape, coordinate, &mut gradient);
+                    *value += term.weight[c] * lobe.value(&shape, coordinate, gradient);
                 }
             }
         }
-        out
     }
 
     /// Directional albedo of each channel at polar angle `theta` (rad): what share of the light from there it reflects.

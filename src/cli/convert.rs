@@ -1,0 +1,71 @@
+//! `goniofit convert`: between measurement formats; a fit is sampled onto the format's grid.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::failure::Failure;
+use super::info::Reading;
+use super::output::{output_format, write_measurement};
+use super::simulate::parse_scan;
+use super::ui::Ui;
+use crate::chain::{self, Source};
+use crate::gonio::Scan;
+use crate::measurement::{Format, MerlGrid, Directions};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  goniofit convert gold.binary gold.csv\n  goniofit convert gold.json gold-fit.binary")]
+pub(super) struct Args {
+    /// A measurement, or a fitted material (.json); `-` is stdin
+    input: String,
+    /// Where to write; the extension chooses the format; `-` is stdout
+    out: PathBuf,
+    /// Format to write (default: by the extension)
+    #[arg(long, value_parser = parse_written, value_name = "merl|csv")]
+    to: Option<Format>,
+    /// Grid to sample a fit on (default: merl for MERL, else hemisphere:5)
+    #[arg(long, value_name = "SCAN")]
+    scan: Option<String>,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+fn parse_written(text: &str) -> Result<Format, String> {
+    Format::from_name(text).filter(|f| f.is_written()).ok_or_else(|| "known are merl, csv".into())
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let format = output_format(&args.out, args.to)?;
+    let options = args.reading.options();
+    let table = match chain::load(&args.input, &options)? {
+        Source::Measured(table) => {
+            if args.scan.is_some() {
+                return Err(Failure::usage("--scan: a measurement keeps its own directions; only a fit is sampled"));
+            }
+            *table
+        }
+        Source::Fitted(material) => {
+            let flat = material.is_flat();
+            let scan = match &args.scan {
+                Some(text) => parse_scan(text)?,
+                None if format == Format::Merl => Scan::Merl,
+                None if flat => Scan::Flat { step_deg: 1.0 },
+                None => Scan::Hemisphere { step_deg: 5.0 },
+            };
+            let mut table = chain::tabulate(&args.input, &material, &scan, ui.control())?;
+            if let Directions::Merl(grid) = &mut table.directions {
+                *grid = MerlGrid { angles: options.merl_angles };
+            }
+            table
+        }
+    };
+    for note in &table.notes {
+        ui.note(&format!("note: {note}"));
+    }
+    write_measurement(&table, &args.out, format, ui)?;
+    if args.out != PathBuf::from("-") {
+        let text = format!("{}: {} direction pairs as {}", args.out.display(), table.len(), format.description());
+        ui.result(&text, &json!({ "out": args.out, "entries": table.len(), "format": format.name() }));
+    }
+    Ok(())
+}

@@ -1,0 +1,81 @@
+//! Output files of the commands.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::failure::Failure;
+use super::ui::Ui;
+use crate::control::write_whole;
+use crate::measurement::{Format, Measurement, MeasurementError, formats};
+
+/// Writes a text file whole, or to stdout for `-` (where a closed pipe is no error).
+pub(super) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    if path == Path::new("-") {
+        let mut out = io::stdout().lock();
+        return closed_pipe_is_fine(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+            .map_err(|e| Failure::output(path, &e));
+    }
+    write_whole::<_, io::Error>(path, |w| w.write_all(text.as_bytes())).map_err(|e| Failure::output(path, &e))
+}
+
+fn closed_pipe_is_fine(result: io::Result<()>) -> io::Result<()> {
+    match result {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
+}
+
+/// The format to write a measurement in: as asked, else by the extension, CSV on stdout.
+pub(super) fn output_format(path: &Path, asked: Option<Format>) -> Result<Format, Failure> {
+    let known = || {
+        Failure::usage(format!(
+            "{}: its extension names no format that can be written; use .binary (MERL) or .csv, or say --to",
+            path.display()
+        ))
+    };
+    match asked {
+        Some(format) => Ok(format),
+        None if path == Path::new("-") => Ok(Format::Csv),
+        None => Format::from_extension(path).ok_or_else(known),
+    }
+}
+
+enum WriteFailure {
+    Content(MeasurementError),
+    Disk(io::Error),
+}
+
+impl From<io::Error> for WriteFailure {
+    fn from(error: io::Error) -> Self {
+        Self::Disk(error)
+    }
+}
+
+/// Writes a measurement whole, and says what its format could not hold.
+pub(super) fn write_measurement(table: &Measurement, path: &Path, format: Format, ui: &Ui) -> Result<(), Failure> {
+    let write = |out: &mut dyn Write| formats::write(table, format, path, out).map_err(WriteFailure::Content);
+    let written = if path == Path::new("-") { write(&mut io::stdout().lock()) } else { write_whole(path, write) };
+    let report = match written {
+        Ok(report) => report,
+        Err(WriteFailure::Content(MeasurementError::Io { source, .. }) | WriteFailure::Disk(source)) => {
+            if path == Path::new("-") && source.kind() == io::ErrorKind::BrokenPipe {
+                return Ok(());
+            }
+            return Err(Failure::output(path, &source));
+        }
+        Err(WriteFailure::Content(error)) => return Err(error.into()),
+    };
+    let name = format.description();
+    if report.lost_negative > 0 {
+        ui.warn(&format!(
+            "{}: {name} has no negative values (they mean \"not measured\" there): {} readings that noise made negative are \
+             written as not measured",
+            path.display(),
+            report.lost_negative
+        ));
+    }
+    if report.lost_sigma + report.lost_common > 0 {
+        ui.warn(&format!("{}: {name} has no place for σ: written without; .csv keeps it", path.display()));
+    }
+    Ok(())
+}

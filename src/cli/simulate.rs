@@ -1,0 +1,132 @@
+//! `goniofit simulate`: the simulated gonioreflectometer writes a measurement.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::failure::Failure;
+use super::output::{output_format, write_measurement};
+use super::ui::Ui;
+use crate::chain;
+use crate::gonio::{Instrument, Scan, SimulationSpec};
+use crate::measurement::{ReadOptions, formats};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit simulate --material glossy-paint --scan hemisphere:5 --seed 1 --out paint.csv
+  goniofit simulate --material gold.json --scan merl --noiseless --out gold.binary")]
+pub(super) struct Args {
+    /// A simulation file; options given beside it replace what it says
+    spec: Option<PathBuf>,
+    /// The truth: a built-in material (see `goniofit models`), a fitted .json or a measurement
+    #[arg(long, value_name = "M")]
+    material: Option<String>,
+    /// Where to measure: in-plane[:STEP], hemisphere[:STEP], flat[:STEP] (degrees), merl, or list:FILE with the directions of
+    /// another measurement [default: hemisphere:5]
+    #[arg(long, value_name = "S")]
+    scan: Option<String>,
+    /// Seed of the noise [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Photoelectrons in a reading of 1/sr at cosθo = 1 [default: 100000]
+    #[arg(long, value_name = "E")]
+    electrons: Option<f64>,
+    /// Read noise, electrons [default: 10]
+    #[arg(long, value_name = "E")]
+    read_noise: Option<f64>,
+    /// Readings averaged at each pair of directions [default: 1]
+    #[arg(long, value_name = "N")]
+    readings: Option<u32>,
+    /// A detector without noise
+    #[arg(long, conflicts_with_all = ["electrons", "read_noise", "readings"])]
+    noiseless: bool,
+    /// Where to write; the extension chooses the format (.csv, .binary); `-` is CSV on stdout
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let format = output_format(&args.out, None)?;
+    let plan = Plan::new(args)?;
+    let source = chain::load(&plan.material, &ReadOptions::default())?;
+    let name = Path::new(&plan.material).file_stem().map_or("simulated".into(), |s| s.to_string_lossy());
+    let table = chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
+    write_measurement(&table, &args.out, format, ui)?;
+    let valid = table.values.len() as u64 - table.masked.total();
+    if args.out != PathBuf::from("-") {
+        let text = format!(
+            "{}: {} direction pairs, {valid} valid values, scan {}, seed {}",
+            args.out.display(),
+            table.len(),
+            plan.scan,
+            plan.seed
+        );
+        let object = json!({ "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed });
+        ui.result(&text, &object);
+    }
+    Ok(())
+}
+
+/// What to simulate, checked.
+struct Plan {
+    material: String,
+    scan: Scan,
+    seed: u64,
+    instrument: Instrument,
+}
+
+impl Plan {
+    fn new(args: &Args) -> Result<Self, Failure> {
+        let spec = args.spec.as_deref().map(read_spec).transpose()?;
+        let base = args.spec.as_deref().and_then(Path::parent).unwrap_or_else(|| Path::new(""));
+        let of_spec = spec.as_ref();
+        let material = match (&args.material, of_spec.and_then(|s| s.material.as_ref())) {
+            (Some(typed), _) => typed.clone(),
+            (None, Some(written)) => relative_to(base, written),
+            (None, None) => {
+                return Err(Failure::usage("--material: say what to measure, for example --material glossy-paint"));
+            }
+        };
+        let scan = match (&args.scan, of_spec.and_then(|s| s.scan.as_ref())) {
+            (Some(typed), _) => parse_scan(typed)?,
+            (None, Some(written)) => match written.strip_prefix("list:") {
+                Some(file) => parse_scan(&format!("list:{}", relative_to(base, file)))?,
+                None => parse_scan(written)?,
+            },
+            (None, None) => Scan::Hemisphere { step_deg: 5.0 },
+        };
+        let mut instrument = of_spec.map_or_else(Instrument::default, |s| s.instrument);
+        if args.noiseless {
+            instrument = Instrument::noiseless();
+        }
+        instrument.electrons = args.electrons.unwrap_or(instrument.electrons);
+        instrument.read_noise = args.read_noise.unwrap_or(instrument.read_noise);
+        instrument.readings = args.readings.unwrap_or(instrument.readings);
+        if let Some(fault) = instrument.fault() {
+            return Err(Failure::usage(fault));
+        }
+        let seed = args.seed.or(of_spec.and_then(|s| s.seed)).unwrap_or(0);
+        Ok(Self { material, scan, seed, instrument })
+    }
+}
+
+fn read_spec(path: &Path) -> Result<SimulationSpec, Failure> {
+    let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("{}: {e}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(&e))?;
+    SimulationSpec::from_toml(&text).map_err(|e| wrong(&e))
+}
+
+/// A file that a simulation file names stands beside it; a built-in material's name stays.
+fn relative_to(base: &Path, name: &str) -> String {
+    let beside = base.join(name);
+    if beside.exists() { beside.to_string_lossy().into_owned() } else { name.to_owned() }
+}
+
+/// A scan as typed; `list:FILE` takes the directions and weights of that measurement.
+pub(super) fn parse_scan(text: &str) -> Result<Scan, Failure> {
+    if let Some(file) = text.strip_prefix("list:") {
+        let table = formats::read(Path::new(file), &ReadOptions::default())?;
+        return Ok(chain::scan_of(file, &table));
+    }
+    text.parse().map_err(|e: crate::gonio::ScanError| Failure::usage(e.to_string()))
+}

@@ -1,0 +1,138 @@
+//! What a command says and shows: results on stdout, everything else on stderr.
+
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::failure::Failure;
+use crate::control::{Control, Progress, Stop};
+
+static STOP: Stop = Stop::new();
+
+/// The flag that Ctrl-C raises.
+pub(super) fn stop() -> &'static Stop {
+    &STOP
+}
+
+/// Ctrl-C asks the work to stop with the best so far; a second one ends the process at once.
+pub(super) fn install_stop() {
+    // Without a handler Ctrl-C ends the process at once, which is no reason not to work.
+    let _ = ctrlc::set_handler(|| {
+        if STOP.requested() {
+            std::process::exit(130);
+        }
+        STOP.request();
+    });
+}
+
+/// How a command talks.
+pub(super) struct Ui {
+    json: bool,
+    quiet: bool,
+    bar: Bar,
+}
+
+impl Ui {
+    pub fn new(json: bool, quiet: bool) -> Self {
+        let shown = !quiet && std::io::stderr().is_terminal();
+        Self { json, quiet, bar: Bar { shown, current: Mutex::new(None) } }
+    }
+
+    /// Progress on a terminal, and the wish to stop.
+    pub fn control(&self) -> Control<'_> {
+        Control { progress: &self.bar, stop: &STOP }
+    }
+
+    /// A remark on stderr, unless quiet.
+    pub fn note(&self, text: &str) {
+        if !self.quiet {
+            self.bar.aside(|| eprintln!("{text}"));
+        }
+    }
+
+    /// A warning on stderr, unless quiet.
+    pub fn warn(&self, text: &str) {
+        self.note(&format!("warning: {text}"));
+    }
+
+    /// The command's result: `text` for people, or the JSON object.
+    pub fn result(&self, text: &str, json: &serde_json::Value) {
+        if self.json {
+            print_line(&json.to_string());
+        } else if !text.is_empty() {
+            print_line(text.trim_end());
+        }
+    }
+}
+
+/// Prints a line on stdout; a closed pipe is no error.
+fn print_line(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+}
+
+/// Says why a command failed, as `{"error": …}` on stdout or as text on stderr.
+pub(super) fn report_failure(failure: &Failure, json: bool) -> ExitCode {
+    if json {
+        print_line(&serde_json::json!({ "error": failure.message }).to_string());
+    } else {
+        let message = failure.message.strip_prefix("error: ").unwrap_or(&failure.message);
+        eprintln!("error: {message}");
+    }
+    ExitCode::from(failure.code)
+}
+
+/// A progress bar, on a terminal only.
+struct Bar {
+    shown: bool,
+    current: Mutex<Option<ProgressBar>>,
+}
+
+impl Bar {
+    fn with(&self, f: impl FnOnce(&mut Option<ProgressBar>)) {
+        if self.shown {
+            f(&mut self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
+        }
+    }
+
+    /// Prints without tearing the bar.
+    fn aside(&self, print: impl FnOnce()) {
+        let bar = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        match &*bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
+}
+
+impl Progress for Bar {
+    fn start(&self, label: &str, total: u64) {
+        self.with(|current| {
+            let bar = ProgressBar::new(total).with_message(label.to_owned());
+            if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:30} {percent:>3} %  {elapsed} of {duration}") {
+                bar.set_style(style);
+            }
+            bar.enable_steady_tick(Duration::from_millis(200));
+            *current = Some(bar);
+        });
+    }
+
+    fn advance(&self, steps: u64) {
+        self.with(|current| {
+            if let Some(bar) = current {
+                bar.inc(steps);
+            }
+        });
+    }
+
+    fn finish(&self) {
+        self.with(|current| {
+            if let Some(bar) = current.take() {
+                bar.finish_and_clear();
+            }
+        });
+    }
+}
