@@ -6,10 +6,12 @@
 
 pub mod error;
 pub mod formats;
+pub mod interpolate;
 pub mod merl_grid;
 pub mod table;
 
 pub use error::MeasurementError;
 pub use formats::{Format, Quantity, ReadOptions};
+pub use interpolate::{Albedo, TableBrdf, directional_albedo};
 pub use merl_grid::{MerlAngles, MerlGrid};
 pub use table::{Dimension, Directions, Masked, Measurement, Weights};
