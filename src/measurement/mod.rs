@@ -6,12 +6,14 @@
 
 pub mod error;
 pub mod formats;
+pub mod interpolate;
 pub mod merl_grid;
 pub mod summary;
 pub mod table;
 
 pub use error::MeasurementError;
 pub use formats::{Format, Quantity, ReadOptions};
+pub use interpolate::{Albedo, TableBrdf, directional_albedo};
 pub use merl_grid::{MerlAngles, MerlGrid};
 pub use summary::Summary;
 pub use table::{Dimension, Directions, Masked, Measurement, Weights};
