@@ -1,7 +1,7 @@
 //! What can be wrong with a measurement file. *Invalid*: the file contradicts its format. *Unsupported*: it may be right, but
 //! goniofit can't use it. *Io*: the disk.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a measurement could not be read, written or used.
 #[derive(Debug, thiserror::Error)]
@@ -47,4 +47,26 @@ pub enum MeasurementError {
         /// Why, and what would work instead.
         reason: String,
     },
+}
+
+impl MeasurementError {
+    /// `path` could not be read or written because of `source`.
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+
+    /// At `place` of `path` stands `found` where `expected` belongs.
+    pub(crate) fn invalid(
+        path: &Path,
+        place: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self::Invalid { path: path.into(), place: place.into(), expected: expected.into(), found: found.into() }
+    }
+
+    /// `path` may be right, but can't be used because of `reason`.
+    pub(crate) fn unsupported(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Unsupported { path: path.into(), reason: reason.into() }
+    }
 }

@@ -1,8 +1,26 @@
 //! File formats, one file each. Content is sniffed; a name's extension only chooses what to write.
+//!
+//! In: a path (`-` is stdin) and [`ReadOptions`]. Out: a [`Measurement`], or a [`MeasurementError`] that names file, place, what was
+//! expected and what was found. The one decision to know: a direction at or below the horizon is no error in a listed table;
+//! its values are masked, and a note says how many and where the first stands. (A table on the MERL grid keeps them: the
+//! format itself marks what is not measured.)
 
+mod alta;
+mod cells;
+mod csv;
+mod fred;
+mod merl;
+mod rows;
+mod sniff;
+mod source;
+mod text;
+mod zemax;
+
+use std::io::Write;
 use std::path::Path;
 
-use super::{MeasurementError, MerlAngles};
+use self::source::Source;
+use super::{Measurement, MeasurementError, MerlAngles};
 
 /// The formats that goniofit reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +39,61 @@ pub enum Format {
     Fred,
 }
 
+impl Format {
+    /// Every format.
+    pub const ALL: [Self; 6] = [Self::Merl, Self::Csv, Self::Alta, Self::Rgl, Self::Zemax, Self::Fred];
+
+    /// The name that options use.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Merl => "merl",
+            Self::Csv => "csv",
+            Self::Alta => "alta",
+            Self::Rgl => "rgl",
+            Self::Zemax => "zemax",
+            Self::Fred => "fred",
+        }
+    }
+
+    /// What it is, in words.
+    #[must_use]
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Merl => "MERL binary",
+            Self::Csv => "CSV",
+            Self::Alta => "ALTA text",
+            Self::Rgl => "RGL tensor file",
+            Self::Zemax => "Zemax BSDF text",
+            Self::Fred => "FRED BSDF text",
+        }
+    }
+
+    /// The format called `name` in options.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| format.name().eq_ignore_ascii_case(name))
+    }
+
+    /// The format that a file of this name is written in: `.binary`, `.csv`. `None` for an extension that belongs to no format,
+    /// to one that is only read, or to several (`.bsdf`).
+    #[must_use]
+    pub fn from_extension(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?;
+        match extension.to_ascii_lowercase().as_str() {
+            "binary" => Some(Self::Merl),
+            "csv" => Some(Self::Csv),
+            _ => None,
+        }
+    }
+
+    /// Whether [`write`] writes it.
+    #[must_use]
+    pub fn is_written(self) -> bool {
+        matches!(self, Self::Merl | Self::Csv)
+    }
+}
+
 /// Whether a file's values are the BRDF or the BRDF times the cosine of the outgoing direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quantity {
@@ -36,17 +109,90 @@ pub enum Quantity {
 pub struct ReadOptions {
     /// Overrides what sniffing finds.
     pub format: Option<Format>,
-    /// Overrides what the file says of its quantity.
+    /// Overrides what the file says of its quantity (not for MERL and RGL files, whose format defines it).
     pub quantity: Option<Quantity>,
     /// Where in its bin a MERL entry is read.
     pub merl_angles: MerlAngles,
 }
 
-/// Reads a measurement.
+/// What a written file could not hold; all zero when nothing was lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct WriteReport {
+    /// Valid negative values (noise), written as not measured.
+    pub lost_negative: u64,
+    /// σ values left out.
+    pub lost_sigma: u64,
+    /// Shared error components left out.
+    pub lost_common: u64,
+}
+
+/// Reads a measurement; the path `-` is stdin.
 ///
 /// # Errors
 /// [`MeasurementError`] naming file, place, what was expected and what was found.
-pub fn read(path: &Path, options: &ReadOptions) -> Result<super::Measurement, MeasurementError> {
-    let _ = options;
-    Err(MeasurementError::Unsupported { path: path.into(), reason: "unknown format".into() })
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Measurement, MeasurementError> {
+    read_source(&Source::open(path)?, options)
+}
+
+/// Reads a measurement from `bytes`; messages call it `path`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Measurement, MeasurementError> {
+    read_source(&Source::from_bytes(path, bytes), options)
+}
+
+fn read_source(source: &Source, options: &ReadOptions) -> Result<Measurement, MeasurementError> {
+    let format = options.format.map_or_else(|| sniff::sniff(source), Ok)?;
+    let mut measurement = match format {
+        Format::Merl => merl::read(source, options),
+        Format::Csv => csv::read(source, options),
+        Format::Alta => alta::read(source, options),
+        Format::Zemax => zemax::read(source, options),
+        Format::Fred => fred::read(source, options),
+        // The reader of RGL tensor files joins here.
+        Format::Rgl => Err(MeasurementError::unsupported(source.path(), "RGL tensor files are not read yet")),
+    }?;
+    measurement.origin = format.description().into();
+    Ok(measurement)
+}
+
+/// Writes `measurement` to `out` as MERL or CSV and reports what the format could not hold. `path` is what messages call the
+/// output; putting the file in place as a whole is up to the caller.
+///
+/// # Errors
+/// [`MeasurementError::Unsupported`] for a format that is only read, or that can't hold this table (with what would work instead);
+/// [`MeasurementError::Io`] when `out` refuses.
+pub fn write(
+    measurement: &Measurement,
+    format: Format,
+    path: &Path,
+    out: &mut dyn Write,
+) -> Result<WriteReport, MeasurementError> {
+    match format {
+        Format::Merl => merl::write(measurement, path, out),
+        Format::Csv => csv::write(measurement, path, out).map(|()| WriteReport::default()),
+        Format::Alta | Format::Rgl | Format::Zemax | Format::Fred => {
+            let reason = format!("{} is read, not written; choose csv or merl", format.description());
+            Err(MeasurementError::unsupported(path, reason))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_extensions_find_their_formats() {
+        for format in Format::ALL {
+            assert_eq!(Format::from_name(format.name()), Some(format));
+            assert_eq!(Format::from_name(&format.name().to_uppercase()), Some(format));
+        }
+        assert_eq!(Format::from_extension(Path::new("a/b.BINARY")), Some(Format::Merl));
+        assert_eq!(Format::from_extension(Path::new("b.csv")), Some(Format::Csv));
+        for none in ["b.bsdf", "b", "-", "b.xyz", "binary"] {
+            assert_eq!(Format::from_extension(Path::new(none)), None, "{none}");
+        }
+    }
 }

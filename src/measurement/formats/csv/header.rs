@@ -1,0 +1,210 @@
+//! The comments and the header line: what each column holds.
+
+use super::{ANGLES, FLAT_ANGLES, GRIDS, SOLID_ANGLE, is_reserved};
+use crate::measurement::formats::Quantity;
+use crate::measurement::formats::text::{Line, Lines, quoted};
+use crate::measurement::{Dimension, MeasurementError, MerlAngles};
+
+/// What the comments say.
+#[derive(Debug, Default)]
+pub(super) struct Comments {
+    pub(super) quantity: Quantity,
+    pub(super) dimension: Dimension,
+    pub(super) grid: Option<MerlAngles>,
+    pub(super) solid_angle: bool,
+    pub(super) notes: Vec<String>,
+}
+
+/// Where every quantity's column is.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Columns {
+    /// All names, in the file's order.
+    pub(super) names: Vec<String>,
+    /// The angle columns, in the order of [`ANGLES`] (space) or [`FLAT_ANGLES`].
+    pub(super) angles: Vec<usize>,
+    pub(super) channels: Vec<usize>,
+    /// Empty, or one for each channel.
+    pub(super) sigma: Vec<usize>,
+    /// For each shared component, one for each channel.
+    pub(super) common: Vec<Vec<usize>>,
+    pub(super) weight: Option<usize>,
+}
+
+/// Reads the `#` lines and the header.
+pub(super) fn read(lines: &mut Lines<'_>) -> Result<(Comments, Columns), MeasurementError> {
+    let mut comments = Comments::default();
+    while let Some(line) = lines.next_filled()? {
+        if let Some(comment) = line.text.trim_start().strip_prefix('#') {
+            comments.take(line, comment)?;
+        } else {
+            let columns = Columns::parse(line, comments.dimension)?;
+            return comments.check(line).map(|()| (comments, columns));
+        }
+    }
+    Err(lines.ends_too_early("a header line of column names"))
+}
+
+impl Comments {
+    /// Takes in what follows the `#` of one line; free text is passed over.
+    fn take(&mut self, line: Line<'_>, comment: &str) -> Result<(), MeasurementError> {
+        let Some((key, value)) = comment.split_once(':') else { return Ok(()) };
+        let value = value.trim();
+        match key.trim() {
+            "quantity" => {
+                self.quantity = match value {
+                    "brdf" => Quantity::Brdf,
+                    "brdf_cos" => Quantity::BrdfCos,
+                    _ => return Err(line.invalid("quantity", "brdf or brdf_cos", quoted(value))),
+                }
+            }
+            "dimension" => {
+                self.dimension = match value {
+                    "2" => Dimension::Flat,
+                    "3" => Dimension::Space,
+                    _ => return Err(line.invalid("dimension", "2 or 3", quoted(value))),
+                }
+            }
+            "grid" => {
+                self.grid = GRIDS.iter().find(|(name, _)| *name == value).map(|(_, angles)| *angles);
+                if self.grid.is_none() {
+                    self.notes.push(format!("line {}: the grid {} is unknown: ignored", line.number, quoted(value)));
+                }
+            }
+            "weights" => self.solid_angle = value == SOLID_ANGLE,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn check(&self, line: Line<'_>) -> Result<(), MeasurementError> {
+        if self.grid.is_some() && self.dimension == Dimension::Flat {
+            return Err(line.invalid("", "a MERL grid in space", "both a MERL grid and dimension 2"));
+        }
+        Ok(())
+    }
+}
+
+impl Columns {
+    /// Sorts the names of the header line.
+    fn parse(line: Line<'_>, dimension: Dimension) -> Result<Self, MeasurementError> {
+        let names = split(line)?;
+        refuse_doubles(line, &names)?;
+        refuse_raw_readings(line, &names)?;
+        let find = |name: &str| names.iter().position(|n| n == name);
+        let required: &[&str] = if dimension == Dimension::Flat { &FLAT_ANGLES } else { &ANGLES };
+        let angle = |name: &&str| find(name).ok_or_else(|| missing(line, name, dimension));
+        let angles: Vec<usize> = required.iter().map(angle).collect::<Result<_, _>>()?;
+        let extra = names
+            .iter()
+            .find(|n| (n.starts_with("theta_") || n.starts_with("phi_")) && !required.contains(&n.as_str()));
+        if let Some(extra) = extra {
+            let expected = format!("the angles {} and no others", required.join(", "));
+            return Err(line.invalid("header", expected, quoted(extra)));
+        }
+        let channels: Vec<usize> = (0..names.len()).filter(|&i| !is_reserved(&names[i])).collect();
+        if channels.is_empty() {
+            let expected = "a column of values besides the angles, under the channel's name";
+            return Err(line.invalid("header", expected, quoted(line.text)));
+        }
+        let sigma = per_channel(line, &names, &channels, "sigma_")?;
+        let common = shared_components(line, &names, &channels)?;
+        let weight = find("weight");
+        Ok(Self { names, angles, channels, sigma, common, weight })
+    }
+
+    /// Names of the channels.
+    pub(super) fn channel_names(&self) -> Vec<String> {
+        self.channels.iter().filter_map(|&i| self.names.get(i).cloned()).collect()
+    }
+
+    /// "column `r`", for messages.
+    pub(super) fn label(&self, column: usize) -> String {
+        format!("column {}", self.names.get(column).map_or("?", String::as_str))
+    }
+}
+
+/// The cells of the header line; names may stand in quotes.
+fn split(line: Line<'_>) -> Result<Vec<String>, MeasurementError> {
+    let mut reader =
+        ::csv::ReaderBuilder::new().has_headers(false).trim(::csv::Trim::All).from_reader(line.text.as_bytes());
+    let mut record = ::csv::StringRecord::new();
+    let read = reader.read_record(&mut record).map_err(|e| line.invalid("header", "column names", e.to_string()))?;
+    let names: Vec<String> = record.iter().map(str::to_string).collect();
+    if !read || names.iter().any(String::is_empty) {
+        return Err(line.invalid("header", "a name for every column", quoted(line.text)));
+    }
+    Ok(names)
+}
+
+fn refuse_doubles(line: Line<'_>, names: &[String]) -> Result<(), MeasurementError> {
+    match names.iter().enumerate().find(|(i, name)| names.iter().take(*i).any(|n| n == *name)) {
+        Some((_, name)) => Err(line.invalid("header", "each column once", format!("{} twice", quoted(name)))),
+        None => Ok(()),
+    }
+}
+
+fn refuse_raw_readings(line: Line<'_>, names: &[String]) -> Result<(), MeasurementError> {
+    if names.iter().any(|n| n.starts_with("signal_")) {
+        return Err(
+            line.unsupported("these are raw readings (signal_…), not a BRDF: `goniofit reduce` makes one of them")
+        );
+    }
+    Ok(())
+}
+
+fn missing(line: Line<'_>, name: &str, dimension: Dimension) -> MeasurementError {
+    let hint = if line.text.contains(';') && !line.text.contains(',') {
+        " (columns are separated by commas, not semicolons)"
+    } else if dimension == Dimension::Space && name.starts_with("phi_") {
+        " (an in-plane scan of the flat world says so by a line `# dimension: 2`)"
+    } else {
+        ""
+    };
+    line.invalid("header", format!("a column {name}{hint}"), quoted(line.text))
+}
+
+/// The columns `<prefix><channel>` of all channels, or of none.
+fn per_channel(
+    line: Line<'_>,
+    names: &[String],
+    channels: &[usize],
+    prefix: &str,
+) -> Result<Vec<usize>, MeasurementError> {
+    let of_channel = |c: &usize| names.iter().position(|n| n.strip_prefix(prefix) == names.get(*c).map(String::as_str));
+    let known: Vec<Option<usize>> = channels.iter().map(of_channel).collect();
+    let stray = (0..names.len()).find(|i| names[*i].starts_with(prefix) && !known.contains(&Some(*i)));
+    let list = |c: &[usize]| c.iter().filter_map(|&i| names.get(i).map(String::as_str)).collect::<Vec<_>>().join(", ");
+    if let Some(stray) = stray {
+        let expected = format!("{prefix} and the name of a channel ({})", list(channels));
+        return Err(line.invalid("header", expected, quoted(&names[stray])));
+    }
+    if known.iter().all(Option::is_none) {
+        return Ok(Vec::new());
+    }
+    known.into_iter().collect::<Option<_>>().ok_or_else(|| {
+        line.invalid(
+            "header",
+            format!("{prefix}… for every channel ({}) or for none", list(channels)),
+            quoted(line.text),
+        )
+    })
+}
+
+/// The columns `common_<k>_<channel>`, by ascending k.
+fn shared_components(
+    line: Line<'_>,
+    names: &[String],
+    channels: &[usize],
+) -> Result<Vec<Vec<usize>>, MeasurementError> {
+    let mut keys: Vec<u32> = Vec::new();
+    for name in names {
+        let Some(rest) = name.strip_prefix("common_") else { continue };
+        let key = rest.split_once('_').and_then(|(k, _)| k.parse().ok());
+        let key = key.ok_or_else(|| line.invalid("header", "common_<number>_<channel>", quoted(name)))?;
+        if !keys.contains(&key) {
+            keys.push(key);
+        }
+    }
+    keys.sort_unstable();
+    keys.iter().map(|k| per_channel(line, names, channels, &format!("common_{k}_"))).collect()
+}

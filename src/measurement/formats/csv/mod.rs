@@ -1,0 +1,36 @@
+//! goniofit's own CSV: `#` lines, a header line, one row a pair of directions.
+//!
+//! Columns stand in any order: `theta_i_deg`, `phi_i_deg`, `theta_o_deg`, `phi_o_deg`; one per channel, under any other name, in 1/sr; `sigma_<channel>`
+//! (≥ 0, 0 is exact), for every channel or none; `common_<k>_<channel>` (1 σ, signed), component by component for every channel;
+//! `weight` (≥ 0). An empty value is masked as not measured, `nan` and `inf` as not finite. Comments that mean something:
+//!
+//! - `# quantity: brdf` (default) or `brdf_cos`;
+//! - `# dimension: 2`: the flat world, columns `theta_i_deg` and `theta_o_deg` in [−90, 90], values in 1/rad;
+//! - `# grid: merl-center` or `merl-edge`: the rows are the MERL grid's 1,458,000 entries in order, which is checked; solid angles and
+//!   grid interpolation then work as from a MERL file;
+//! - `# weights: solid-angle`: the `weight` column holds the solid angles of a grid.
+
+mod header;
+mod read;
+mod write;
+
+pub(super) use read::read;
+pub(super) use write::write;
+
+use crate::measurement::MerlAngles;
+
+/// Names of the angle columns, in the order written.
+const ANGLES: [&str; 4] = ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"];
+/// Angle columns of the flat world.
+const FLAT_ANGLES: [&str; 2] = ["theta_i_deg", "theta_o_deg"];
+/// The names that `# grid:` knows.
+const GRIDS: [(&str, MerlAngles); 2] = [("merl-center", MerlAngles::Center), ("merl-edge", MerlAngles::Edge)];
+/// What `# weights:` says when the weights are solid angles.
+const SOLID_ANGLE: &str = "solid-angle";
+
+/// Whether a column of this name is anything but a channel: such a name can't be given to a channel.
+fn is_reserved(name: &str) -> bool {
+    const RAW: [&str; 4] = ["kind", "time_s", "exposure_s", "repeat"];
+    const PREFIXES: [&str; 5] = ["theta_", "phi_", "sigma_", "common_", "signal_"];
+    name.is_empty() || name == "weight" || RAW.contains(&name) || PREFIXES.iter().any(|p| name.starts_with(p))
+}
