@@ -1,5 +1,7 @@
 //! File formats, one file each. Content is sniffed; a name's extension only chooses what to write.
 
+pub mod rgl;
+
 use std::path::Path;
 
 use super::{MeasurementError, MerlAngles};
