@@ -3,6 +3,8 @@
 //! The rooms stand in the order in which data flow.
 
 pub mod brdf;
+pub mod chain;
+pub mod cli;
 pub mod control;
 pub mod fit;
 pub mod geometry;

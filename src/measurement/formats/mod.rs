@@ -10,6 +10,7 @@ mod cells;
 mod csv;
 mod fred;
 mod merl;
+pub mod rgl;
 mod rows;
 mod sniff;
 mod source;
@@ -150,8 +151,7 @@ fn read_source(source: &Source, options: &ReadOptions) -> Result<Measurement, Me
         Format::Alta => alta::read(source, options),
         Format::Zemax => zemax::read(source, options),
         Format::Fred => fred::read(source, options),
-        // The reader of RGL tensor files joins here.
-        Format::Rgl => Err(MeasurementError::unsupported(source.path(), "RGL tensor files are not read yet")),
+        Format::Rgl => rgl::read(source.path(), &source.whole()?, options),
     }?;
     measurement.origin = format.description().into();
     Ok(measurement)

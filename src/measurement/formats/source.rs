@@ -85,6 +85,15 @@ impl Source {
         Ok(head)
     }
 
+    /// All bytes, at most [`STREAM_LIMIT`].
+    pub(super) fn whole(&self) -> Result<Vec<u8>, MeasurementError> {
+        if self.len() > STREAM_LIMIT {
+            let reason = format!("{} bytes are more than the {STREAM_LIMIT} that are read at once", self.len());
+            return Err(MeasurementError::unsupported(&self.path, reason));
+        }
+        self.head(usize::MAX)
+    }
+
     /// A reader of its own that starts at byte `offset`.
     pub(super) fn reader_at(&self, offset: u64) -> Result<Box<dyn BufRead + '_>, MeasurementError> {
         match &self.content {
