@@ -1,3 +1,5 @@
 //! The `goniofit` command.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    goniofit::cli::main()
+}

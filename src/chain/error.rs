@@ -40,6 +40,14 @@ pub enum ChainError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// An output could not be written.
+    #[error("{path}: {source}", path = path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// Neither a built-in material nor a file.
     #[error("there is no material or file \"{name}\"; built-in materials are {known}")]
     NoSuchMaterial {
@@ -85,5 +93,10 @@ impl ChainError {
     /// An [`ChainError::Io`].
     pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
         Self::Io { path: path.into(), source }
+    }
+
+    /// A [`ChainError::Write`].
+    pub fn write(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+        Self::Write { path: path.into(), source }
     }
 }

@@ -1,0 +1,110 @@
+//! Pictures of a reference and of what should look like it, with their differences, in one folder.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::error::ChainError;
+use crate::image::sheet::{Scale, Sheet, Tile};
+use crate::image::{
+    Bitmap, ColorMap, Comparison, Image, compare, develop, difference_map, exposure_for, write_exr, write_png,
+};
+
+/// A picture with its name, in file names and above the picture.
+#[derive(Debug, Clone)]
+pub struct Shown {
+    /// Stem of its files.
+    pub file: String,
+    /// Stem of its difference's files; none for the reference.
+    pub difference_file: String,
+    /// What stands above it.
+    pub label: String,
+    /// The picture.
+    pub image: Image,
+}
+
+/// What was written, and the numbers.
+#[derive(Debug, Clone, Serialize)]
+pub struct Gallery {
+    /// One for each picture that was compared.
+    pub comparisons: Vec<Comparison>,
+    /// Exposure of the previews, stops.
+    pub exposure: f64,
+}
+
+/// The picture less the reference, pixel by pixel, with the error of the difference; masked where either is.
+#[must_use]
+pub fn difference(image: &Image, reference: &Image) -> Image {
+    let zip = |a: &[[f64; 3]], b: &[[f64; 3]], f: fn(f64, f64) -> f64| -> Vec<[f64; 3]> {
+        a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| f(a[c], b[c]))).collect()
+    };
+    let errors = image.standard_error.as_ref().zip(reference.standard_error.as_ref());
+    let masks = image.mask.as_ref().zip(reference.mask.as_ref());
+    Image {
+        radiance: zip(&image.radiance, &reference.radiance, |a, b| a - b),
+        standard_error: errors.map(|(a, b)| zip(a, b, f64::hypot)),
+        mask: masks.map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.max(*b)).collect()),
+        ..image.clone()
+    }
+}
+
+/// Writes `reference` and every other picture as EXR and PNG, the differences likewise, and a contact sheet of all
+/// (`sheet.png`). All previews share one exposure, all difference maps one scale.
+///
+/// # Errors
+/// [`ChainError`] where sizes differ or the disk refuses.
+pub fn write_gallery(
+    folder: &Path,
+    title: &str,
+    subtitle: &str,
+    reference: &Shown,
+    others: &[Shown],
+) -> Result<Gallery, ChainError> {
+    let exposure = exposure_for(&reference.image);
+    let preview = |shown: &Shown| -> Result<Bitmap, ChainError> {
+        write_exr(&folder.join(format!("{}.exr", shown.file)), &shown.image)?;
+        let bitmap = develop(&shown.image, exposure);
+        write_png(&folder.join(format!("{}.png", shown.file)), &bitmap)?;
+        Ok(bitmap)
+    };
+    let mut range = 0.0f64;
+    let mut comparisons = Vec::new();
+    for shown in others {
+        comparisons.push(compare(&shown.image, &reference.image)?);
+        range = range.max(difference_map(&shown.image, &reference.image, None)?.range);
+    }
+    let mut pictures = vec![tile(preview(reference)?, &reference.label, String::new())];
+    let mut maps = vec![legend(&reference.image)];
+    for (shown, comparison) in others.iter().zip(&comparisons) {
+        pictures.push(tile(preview(shown)?, &shown.label, String::new()));
+        let name = &shown.difference_file;
+        write_exr(&folder.join(format!("{name}.exr")), &difference(&shown.image, &reference.image))?;
+        let map = difference_map(&shown.image, &reference.image, Some(range))?;
+        write_png(&folder.join(format!("{name}.png")), &map.bitmap)?;
+        let caption = format!("rmse {:.2e}   relMSE {:.2e}", comparison.rmse, comparison.rel_mse);
+        let unit = "W/(sr m²)".to_owned();
+        let scale = Scale { map: ColorMap::Diverging, low: -map.range, high: map.range, unit };
+        let label = format!("{} less {}", shown.label, reference.label);
+        maps.push(Tile { scale: Some(scale), ..tile(map.bitmap, &label, caption) });
+    }
+    let columns = pictures.len();
+    let tiles = pictures.into_iter().chain(maps).collect();
+    let sheet = Sheet { title: title.into(), subtitle: subtitle.into(), columns, tiles };
+    write_png(&folder.join("sheet.png"), &sheet.draw()?)?;
+    Ok(Gallery { comparisons, exposure })
+}
+
+fn tile(picture: Bitmap, label: &str, caption: String) -> Tile {
+    Tile { picture, label: label.into(), caption, scale: None }
+}
+
+/// The reference's own noise, so that differences can be judged against it.
+fn legend(reference: &Image) -> Tile {
+    let noise = Image {
+        radiance: reference.standard_error.clone().unwrap_or_else(|| vec![[0.0; 3]; reference.radiance.len()]),
+        standard_error: None,
+        ..reference.clone()
+    };
+    let exposure = exposure_for(&noise);
+    tile(develop(&noise, exposure), "standard error of the pixels", format!("white is {:.1e} W/(sr m²)", (-exposure).exp2()))
+}

@@ -1,0 +1,82 @@
+//! Rendering a material in a scene.
+
+use std::path::{Path, PathBuf};
+
+use super::error::ChainError;
+use super::source::{load, render_material};
+use crate::control::Control;
+use crate::image::Image;
+use crate::measurement::ReadOptions;
+use crate::render::scene::builtin;
+use crate::render::{Material, Materials, Options, Scene, SceneSpec, render};
+
+/// A scene to render materials in.
+#[derive(Debug, Clone)]
+pub struct Stage {
+    /// Its description.
+    pub spec: SceneSpec,
+    /// The folder to which its files are relative.
+    pub base: PathBuf,
+}
+
+impl Stage {
+    /// The built-in scene of this name.
+    ///
+    /// # Errors
+    /// [`ChainError`], listing the names that there are.
+    pub fn built_in(name: &str) -> Result<Self, ChainError> {
+        Ok(Self { spec: builtin(name)?, base: PathBuf::new() })
+    }
+
+    /// The scene in a file.
+    ///
+    /// # Errors
+    /// [`ChainError`] naming the place.
+    pub fn read(path: &Path) -> Result<Self, ChainError> {
+        let base = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Ok(Self { spec: SceneSpec::read(path)?, base })
+    }
+}
+
+/// Renders a stage with `subject` in the place of its replaceable material.
+///
+/// # Errors
+/// [`ChainError`] where the scene has none, or can't be built.
+pub fn picture(
+    stage: &Stage,
+    subject: Option<Material>,
+    options: &Options,
+    control: Control<'_>,
+) -> Result<Image, ChainError> {
+    let mut materials = Materials::new();
+    if let Some(subject) = subject {
+        let Some(slot) = &stage.spec.subject else {
+            let name = &stage.spec.name;
+            return Err(ChainError::Mismatch(format!("scene {name} has no `subject`: no material in it can be replaced")));
+        };
+        materials.insert(slot.clone(), subject);
+    }
+    for (name, file) in stage.spec.material_files() {
+        if !materials.contains_key(name) {
+            let path = stage.base.join(file).to_string_lossy().into_owned();
+            materials.insert(name.to_owned(), render_material(&path, &load(&path, &ReadOptions::default())?, None)?);
+        }
+    }
+    let scene = Scene::build(&stage.spec, &stage.base, &materials)?;
+    Ok(render(&scene, options, control)?.to_image())
+}
+
+/// Renders what a name or file stands for.
+///
+/// # Errors
+/// [`ChainError`] where it can't be loaded or rendered.
+pub fn picture_of(
+    name: &str,
+    rgb: Option<&[String; 3]>,
+    stage: &Stage,
+    options: &Options,
+    control: Control<'_>,
+) -> Result<Image, ChainError> {
+    let subject = render_material(name, &load(name, &ReadOptions::default())?, rgb)?;
+    picture(stage, Some(subject), options, control)
+}

@@ -1,0 +1,109 @@
+//! `goniofit demo`: the whole chain, no input needed.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use super::failure::Failure;
+use super::fit::plus_minus;
+use super::ui::{self, Ui};
+use crate::brdf::PerChannel;
+use crate::chain::{Demo, DemoFit, DemoOptions, demo};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  goniofit demo --out my-demo")]
+pub(super) struct Args {
+    /// Folder to write to
+    #[arg(long, default_value = "out/demo", value_name = "DIR")]
+    out: PathBuf,
+    /// Seed of noise and pictures
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+    /// Width and height of the pictures
+    #[arg(long, default_value_t = DemoOptions::default().size, value_parser = clap::value_parser!(u32).range(16..=4096))]
+    size: u32,
+    /// Samples per pixel
+    #[arg(long, default_value_t = DemoOptions::default().samples, value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
+    samples: u32,
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let options = DemoOptions { size: args.size, samples: args.samples, seed: args.seed };
+    let demo = demo(&args.out, &options, ui.control())?;
+    if ui::stop().requested() {
+        ui.warn("stopped: the pictures have fewer samples than asked for");
+    }
+    let mut object = demo.numbers();
+    object["out"] = serde_json::json!(args.out);
+    ui.result(&(describe(&demo) + &format!("\nWritten to {}: look at sheet.png\n", args.out.display())), &object);
+    Ok(())
+}
+
+fn describe(demo: &Demo) -> String {
+    let mut t = format!(
+        "{}: {} direction pairs measured with shot and read noise, then fitted (± is one standard error)\n\n",
+        demo.name, demo.pairs
+    );
+    let _ = write!(t, "  {:18} {:>10}", "parameter", "truth");
+    for fit in &demo.fits {
+        let _ = write!(t, "  {:>22}", fit.material.model());
+    }
+    t.push('\n');
+    for (l, lobe) in demo.truth.lobes.iter().enumerate() {
+        for (c, weight) in lobe.weight.iter().enumerate() {
+            let name = format!("{}.weight[{}]", lobe.kind.name(), demo.truth.channels[c]);
+            row(&mut t, &name, *weight, &demo.fits, |fit| weight_of(fit, l, c));
+        }
+        for (i, parameter) in lobe.kind.lobe().parameters().iter().enumerate() {
+            let truth = lobe.shape_of(0).and_then(|s| s.get(i).copied()).unwrap_or(f64::NAN);
+            row(&mut t, &format!("{}.{}", lobe.kind.name(), parameter.name), truth, &demo.fits, |fit| shape_of(fit, l, i));
+        }
+    }
+    t.push('\n');
+    let number = |t: &mut String, label: &str, f: &dyn Fn(&DemoFit) -> String| {
+        let _ = write!(t, "  {label:29}");
+        for fit in &demo.fits {
+            let _ = write!(t, "  {:>22}", f(fit));
+        }
+        t.push('\n');
+    };
+    let rmse = |f: &DemoFit| f.material.fit.as_ref().map_or(f64::NAN, |r| r.rmse);
+    number(&mut t, "rmse of the fit [1/sr]", &|f| format!("{:.3e}", rmse(f)));
+    number(&mut t, "rmse of the picture", &|f| format!("{:.3e}", f.image.rmse));
+    number(&mut t, "relMSE of the picture", &|f| format!("{:.3e}", f.image.rel_mse));
+    let verdict = |f: &DemoFit| match &f.image.significance {
+        Some(s) if s.differs => "differs from the truth".to_owned(),
+        Some(_) => "equal within noise".to_owned(),
+        None => "–".to_owned(),
+    };
+    number(&mut t, "picture beside the truth's", &verdict);
+    t.push_str("\n  times [s]  ");
+    let times: Vec<String> = demo.times.iter().map(|(label, s)| format!("{label} {s:.2}")).collect();
+    t.push_str(&times.join(", "));
+    t.push('\n');
+    t
+}
+
+fn row(t: &mut String, name: &str, truth: f64, fits: &[DemoFit], of: impl Fn(&DemoFit) -> Option<(f64, Option<f64>)>) {
+    let _ = write!(t, "  {name:18} {truth:>10}");
+    for fit in fits {
+        let text = of(fit).map_or("–".into(), |(value, error)| plus_minus(value, error));
+        let _ = write!(t, "  {text:>22}");
+    }
+    t.push('\n');
+}
+
+fn weight_of(fit: &DemoFit, lobe: usize, channel: usize) -> Option<(f64, Option<f64>)> {
+    let record = fit.material.fit.as_ref()?;
+    let value = *fit.material.lobes.get(lobe)?.weight.get(channel)?;
+    Some((value, record.standard_error.get(lobe)?.weight.get(channel).copied().flatten()))
+}
+
+fn shape_of(fit: &DemoFit, lobe: usize, parameter: usize) -> Option<(f64, Option<f64>)> {
+    let record = fit.material.fit.as_ref()?;
+    let value = fit.material.lobes.get(lobe)?.shape.as_ref()?.get(parameter)?.get(0)?;
+    let error = match &record.standard_error.get(lobe)?.shape.get(parameter)?.1 {
+        PerChannel::Shared(error) => *error,
+        PerChannel::Each(_) => None,
+    };
+    Some((value, error))
+}

@@ -1,0 +1,141 @@
+//! `goniofit render`: one picture.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::failure::Failure;
+use super::ui::{self, Ui};
+use crate::chain::{self, Stage};
+use crate::image::{Image, develop, exposure_for, write_exr, write_png};
+use crate::render::Options;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit render --scene sphere-on-plane --material gold.json --out gold.exr --png gold.png
+  goniofit render my-scene.toml --samples 256 --out picture.exr")]
+pub(super) struct Args {
+    /// A scene file
+    #[arg(value_name = "SCENE.toml", conflicts_with = "scene")]
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Material of the scene's subject: a built-in name, a fitted .json or a measurement
+    #[arg(long, value_name = "FILE")]
+    material: Option<String>,
+    /// Where to write the linear picture
+    #[arg(long, value_name = "IMG.exr")]
+    out: PathBuf,
+    /// Also write a preview: exposed, clipped, sRGB
+    #[arg(long, value_name = "IMG.png")]
+    png: Option<PathBuf>,
+    /// Exposure of the preview, stops (default: the brightest 1 % clips)
+    #[arg(long, allow_negative_numbers = true, requires = "png")]
+    exposure: Option<f64>,
+}
+
+/// What pictures are made of.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct PictureArgs {
+    /// A built-in scene (see `goniofit scenes`) [default: sphere-on-plane]
+    #[arg(long, value_name = "NAME")]
+    pub scene: Option<String>,
+    /// Size in pixels, WIDTHxHEIGHT or one number for both [default: as the scene says]
+    #[arg(long, value_parser = parse_size, value_name = "SIZE")]
+    pub size: Option<(u32, u32)>,
+    /// Samples per pixel [default: as the scene says]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub samples: Option<u32>,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
+    /// Channels to show as red, green and blue
+    #[arg(long, value_parser = parse_rgb, value_name = "A,B,C")]
+    pub rgb: Option<[String; 3]>,
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let side = |t: &str| t.parse::<u32>().ok().filter(|v| (1..=16384).contains(v));
+    let pair = text.split_once('x').map_or_else(|| side(text).map(|s| (s, s)), |(w, h)| side(w).zip(side(h)));
+    pair.ok_or_else(|| "expected WIDTHxHEIGHT or one number, 1 to 16384".into())
+}
+
+fn parse_rgb(text: &str) -> Result<[String; 3], String> {
+    let names: Vec<String> = text.split(',').map(|s| s.trim().to_owned()).collect();
+    names.try_into().map_err(|_| "expected three channel names with commas between".into())
+}
+
+impl PictureArgs {
+    /// The built-in scene asked for.
+    pub fn stage(&self) -> Result<Stage, Failure> {
+        Ok(Stage::built_in(self.scene.as_deref().unwrap_or("sphere-on-plane"))?)
+    }
+
+    /// Render options: what was typed, else what the scene says.
+    pub fn options(&self, stage: &Stage) -> Options {
+        let mut options = Options { seed: self.seed, ..Options::of(&stage.spec) };
+        if let Some((width, height)) = self.size {
+            (options.width, options.height) = (width, height);
+        }
+        options.samples = self.samples.unwrap_or(options.samples);
+        options
+    }
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let stage = match &args.file {
+        Some(path) => Stage::read(path)?,
+        None => args.picture.stage()?,
+    };
+    check_folder(&args.out)?;
+    let options = args.picture.options(&stage);
+    let image = match &args.material {
+        Some(name) => chain::picture_of(name, args.picture.rgb.as_ref(), &stage, &options, ui.control())?,
+        None => chain::picture(&stage, None, &options, ui.control())?,
+    };
+    write_exr(&args.out, &image).map_err(|e| Failure::work(e.to_string()))?;
+    if let Some(png) = &args.png {
+        let exposure = args.exposure.unwrap_or_else(|| exposure_for(&image));
+        write_png(png, &develop(&image, exposure)).map_err(|e| Failure::work(e.to_string()))?;
+    }
+    if ui::stop().requested() {
+        ui.warn("stopped: the picture has fewer samples than asked for");
+    }
+    let unknown = unknown_share(&image);
+    if unknown > 0.0 {
+        ui.warn(&format!(
+            "{:.1} % of the pixels met directions that were not measured: they are marked in the layer `mask`",
+            100.0 * unknown
+        ));
+    }
+    let (samples, seconds) = (image.metadata.samples.unwrap_or(0), image.metadata.seconds.unwrap_or(0.0));
+    let text = format!(
+        "{}: {} {}×{}, {samples} samples a pixel, {seconds:.2} s",
+        args.out.display(),
+        stage.spec.name,
+        image.width,
+        image.height
+    );
+    let object = json!({
+        "out": args.out, "png": args.png, "scene": stage.spec.name, "width": image.width, "height": image.height,
+        "samples": samples, "seconds": seconds, "seed": options.seed, "unmeasured_share": unknown, "mean": mean(&image),
+    });
+    ui.result(&text, &object);
+    Ok(())
+}
+
+/// The folder of an output must be there before long work starts.
+pub(super) fn check_folder(out: &Path) -> Result<(), Failure> {
+    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    if folder.is_dir() { Ok(()) } else { Err(Failure::usage(format!("{}: there is no such folder", folder.display()))) }
+}
+
+fn unknown_share(image: &Image) -> f64 {
+    let Some(mask) = &image.mask else { return 0.0 };
+    mask.iter().filter(|m| **m > 0.0).count() as f64 / mask.len().max(1) as f64
+}
+
+fn mean(image: &Image) -> [f64; 3] {
+    let n = image.radiance.len().max(1) as f64;
+    std::array::from_fn(|c| image.radiance.iter().map(|p| p[c]).sum::<f64>() / n)
+}

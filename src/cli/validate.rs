@@ -1,0 +1,97 @@
+//! `goniofit validate`: a table and its fits under the same light.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::failure::Failure;
+use super::info::Reading;
+use super::output::write_text;
+use super::render::PictureArgs;
+use super::ui::{self, Ui};
+use crate::chain::{self, Shown, Source, Stage};
+use crate::control::Control;
+use crate::image::Image;
+use crate::measurement::formats;
+use crate::render::Options;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  goniofit validate gold.binary gold.json --scene sphere-on-plane --out gold/")]
+pub(super) struct Args {
+    /// The measurement
+    measurement: PathBuf,
+    /// Fits of it
+    #[arg(required = true, value_name = "FIT.json")]
+    fits: Vec<String>,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Folder to write to: table.exr, fit-1.exr, difference-1.exr …, previews, sheet.png, numbers.json
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let stage = args.picture.stage()?;
+    let table = formats::read(&args.measurement, &args.reading.options())?;
+    for note in &table.notes {
+        ui.note(&format!("{}: note: {note}", args.measurement.display()));
+    }
+    let name = table.name.clone();
+    let fits = args.fits.iter().map(|f| chain::load_material(f).map(|m| (f, m))).collect::<Result<Vec<_>, _>>()?;
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure::output(&args.out, &e))?;
+    let options = args.picture.options(&stage);
+    let studio = Studio { stage: &stage, options, rgb: args.picture.rgb.as_ref(), control: ui.control() };
+    let reference = studio.shown(0, "table", &args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)))?;
+    let mut others = Vec::new();
+    for (k, (file, material)) in fits.iter().enumerate() {
+        let label = format!("fit: {}", material.model());
+        others.push(studio.shown(k as u64 + 1, &label, file, &Source::Fitted(material.clone()))?);
+    }
+    if ui::stop().requested() {
+        ui.warn("stopped: the pictures have fewer samples than asked for");
+    }
+    let subtitle = format!("{} scene, {} samples a pixel", stage.spec.name, options.samples);
+    let gallery = chain::write_gallery(&args.out, &name, &subtitle, &reference, &others)?;
+    let rows: Vec<_> = (fits.iter().zip(&gallery.comparisons).enumerate())
+        .map(|(k, ((file, m), c))| json!({ "fit": file, "model": m.model(), "picture": format!("fit-{}.exr", k + 1), "image": c }))
+        .collect();
+    let object = json!({
+        "measurement": args.measurement, "scene": stage.spec.name, "samples": options.samples, "seed": options.seed,
+        "exposure": gallery.exposure, "fits": rows, "out": args.out,
+    });
+    let numbers = serde_json::to_string_pretty(&object).map_err(|e| Failure::work(e.to_string()))?;
+    write_text(&args.out.join("numbers.json"), &(numbers + "\n"))?;
+    let mut text = format!("{name}, {} scene, {} samples a pixel\n", stage.spec.name, options.samples);
+    let _ = writeln!(text, "  {:28} {:>10} {:>10} {:>8} {:>8}  beyond noise", "", "rmse", "relMSE", "PSNR", "masked");
+    for ((file, m), c) in fits.iter().zip(&gallery.comparisons) {
+        let differs = c.significance.as_ref().map_or("–", |s| if s.differs { "yes" } else { "no" });
+        let psnr = c.psnr.map_or("–".into(), |p| format!("{p:.1}"));
+        let label = format!("{file} ({})", m.model());
+        let _ = writeln!(text, "  {label:28} {:>10.3e} {:>10.3e} {psnr:>8} {:>8}  {differs}", c.rmse, c.rel_mse, c.masked);
+    }
+    let _ = writeln!(text, "  written to {}", args.out.display());
+    ui.result(&text, &object);
+    Ok(())
+}
+
+/// Where and how the pictures are taken.
+struct Studio<'a> {
+    stage: &'a Stage,
+    options: Options,
+    rgb: Option<&'a [String; 3]>,
+    control: Control<'a>,
+}
+
+impl Studio<'_> {
+    /// The `k`-th picture; each has a seed of its own, so that their errors are independent.
+    fn shown(&self, k: u64, label: &str, name: &str, source: &Source) -> Result<Shown, Failure> {
+        let subject = chain::render_material(name, source, self.rgb)?;
+        let options = Options { seed: self.options.seed.wrapping_add(k), ..self.options };
+        let image: Image = chain::picture(self.stage, Some(subject), &options, self.control)?;
+        let file = if k == 0 { "table".into() } else { format!("fit-{k}") };
+        Ok(Shown { file, difference_file: format!("difference-{k}"), label: label.into(), image })
+    }
+}
