@@ -5,5 +5,7 @@
 pub mod brdf;
 pub mod control;
 pub mod geometry;
+pub mod image;
 pub mod measurement;
 pub mod numeric;
+pub mod render;
