@@ -33,7 +33,10 @@ pub fn write_exr(path: &Path, image: &Image) -> Result<(), ImageError> {
     );
     let mut bytes = std::io::Cursor::new(Vec::new());
     let io = |source| ImageError::Io { path: path.into(), source };
-    ex::Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(|e| io(std::io::Error::other(e.to_string())))?;
+    ex::Image::from_layer(layer)
+        .write()
+        .to_buffered(&mut bytes)
+        .map_err(|e| io(std::io::Error::other(e.to_string())))?;
     super::write_whole(path, bytes.get_ref())
 }
 
@@ -43,7 +46,8 @@ pub fn write_exr(path: &Path, image: &Image) -> Result<(), ImageError> {
 /// [`ImageError`] naming the file and what was expected.
 pub fn read_exr(path: &Path) -> Result<Image, ImageError> {
     let bytes = std::fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })?;
-    let invalid = |e: &exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
+    let invalid =
+        |e: &exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
     let read = ex::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     let file = read.non_parallel().from_buffered(std::io::Cursor::new(bytes)).map_err(|e| invalid(&e))?;
     let found = || file.layer_data.iter().flat_map(|l| &l.channel_data.list).map(|c| c.name.to_string());

@@ -4,11 +4,20 @@
 //! the numbers in which two pictures differ. The one decision to know: numbers are always taken from linear radiance;
 //! 8-bit pictures are only for eyes.
 
+mod bitmap;
+mod colormap;
+mod compare;
 mod error;
 mod exr_file;
+pub mod sheet;
+mod tone;
 
+pub use bitmap::{Bitmap, write_png};
+pub use colormap::{ColorMap, DifferenceMap, difference_map};
+pub use compare::{Comparison, Significance, compare};
 pub use error::ImageError;
 pub use exr_file::{read_exr, write_exr};
+pub use tone::{develop, exposure_for, srgb_encode};
 
 /// A picture of linear radiance with its layers. Pixels run along rows, row 0 on top.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,7 +56,13 @@ fn write_whole(path: &std::path::Path, bytes: &[u8]) -> Result<(), ImageError> {
     use std::io::Write;
     let io = |source| ImageError::Io { path: path.into(), source };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| std::path::Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666)); // less the umask: as any other file
+    }
+    let mut file = builder.tempfile_in(folder).map_err(io)?;
     file.write_all(bytes).map_err(io)?;
     file.persist(path).map_err(|e| io(e.error))?;
     Ok(())

@@ -6,11 +6,11 @@
 //! the slab test. So every box grows by 2⁻¹⁹ and every distance too, and the primitives are intersected in f64.
 
 use glam::{DVec3, Vec3A};
+use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray as Ray32, RayHit};
-use obvhs::BvhBuildParams;
 
 use super::ray::Ray;
 
@@ -42,7 +42,8 @@ impl Bvh {
         let to_f32 = |p: DVec3| ((p - center) * scale).as_vec3a();
         let grow = Vec3A::splat(MARGIN as f32);
         let small: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(to_f32(b.0) - grow, to_f32(b.1) + grow)).collect();
-        let tree = build_bvh2(&small, BvhBuildParams::medium_build(), &mut std::time::Duration::ZERO);
+        let mut spent = std::time::Duration::ZERO;
+        let tree = build_bvh2(&small, BvhBuildParams::medium_build(), &mut spent);
         let order = tree.primitive_indices.clone();
         (Self { tree, center, scale }, order)
     }

@@ -199,9 +199,8 @@ impl<'a> Tracer<'a> {
     /// Radiance of a light that a ray ran into, times the weight of having found it so.
     fn light_found(&self, light: usize, surface: &Surface, last: Option<&Scatter>) -> DVec3 {
         let light = &self.scene.lights[light];
-        let weight = last.map_or(1.0, |from| {
-            self.strategy.weight(from.pdf, light.pdf(from.position, surface.point.position), true)
-        });
+        let weight = last
+            .map_or(1.0, |from| self.strategy.weight(from.pdf, light.pdf(from.position, surface.point.position), true));
         light.radiance() * weight
     }
 

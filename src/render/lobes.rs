@@ -35,8 +35,10 @@ impl LobeSum {
         let kd = DVec3::from(spec.kd.unwrap_or_default());
         let total = kd.element_sum() + spec.phong.iter().map(|lobe| lobe.ks.iter().sum::<f64>()).sum::<f64>();
         let share = |weight: f64| if total > 0.0 { weight / total } else { 0.0 };
-        let phong = spec.phong.iter().map(|lobe| {
-            PhongLobe { ks: lobe.ks.into(), exponent: lobe.n, share: share(lobe.ks.iter().sum()) }
+        let phong = spec.phong.iter().map(|lobe| PhongLobe {
+            ks: lobe.ks.into(),
+            exponent: lobe.n,
+            share: share(lobe.ks.iter().sum()),
         });
         Self { kd, phong: phong.collect(), diffuse_share: if total > 0.0 { share(kd.element_sum()) } else { 1.0 } }
     }

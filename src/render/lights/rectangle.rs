@@ -105,25 +105,22 @@ impl RectangleView {
         let center = DVec2::new(d.dot(edges.x), d.dot(edges.y));
         let (low, high) = (center - 0.5 * edges.length, center + 0.5 * edges.length);
         let height = d.dot(quad.normal).abs();
-        // Angle between the planes of two neighbouring edges at distances x and y from the foot point; cos = −(±x y)/…, by atan2.
-        let corner = |x: f64, y: f64, sign: f64| {
-            let sine = height * (height * height + x * x + y * y).sqrt();
-            sine.atan2(sign * x * y)
+        // The angle between the planes of two neighbouring edges is the argument of this complex number, x and y the edges'
+        // distances from the foot point; arguments are added by multiplying.
+        let corner = |x: f64, y: f64| DVec2::new(x * y, height * (height * height + x * x + y * y).sqrt());
+        let sum = |p: DVec2, q: DVec2| {
+            let angle = (p.x * q.y + p.y * q.x).atan2(p.x * q.x - p.y * q.y);
+            if angle < 0.0 { angle + TAU } else { angle }
         };
-        let angles = [
-            corner(high.x, low.y, 1.0),
-            corner(high.x, high.y, -1.0),
-            corner(low.x, high.y, 1.0),
-            corner(low.x, low.y, -1.0),
-        ];
-        let start = TAU - angles[2] - angles[3];
+        let right = sum(corner(high.x, low.y), corner(-high.x, high.y));
+        let start = TAU - sum(corner(low.x, high.y), corner(-low.x, low.y));
         let of_plane = |y: f64| y / (height * height + y * y).sqrt();
         Self {
             low,
             high,
             length: edges.length,
             height,
-            solid_angle: angles[0] + angles[1] - start,
+            solid_angle: right - start,
             start,
             normal_z: DVec2::new(-of_plane(low.y), of_plane(high.y)),
         }
@@ -146,10 +143,10 @@ impl RectangleView {
         // x = height · c/√(1 − c²) with c = sign(f)/√(f² + b0²), and 1 − b0² = h²/(h² + y0²) without cancellation.
         let flat = sqrt_nonneg((f * f - h2 / (h2 + self.low.y * self.low.y)).clamp(0.0, f64::INFINITY));
         let x = (self.height.copysign(f) / flat).clamp(self.low.x, self.high.x);
-        let d = x.hypot(self.height);
-        let sine = |y: f64| y / d.hypot(y);
+        let d2 = x * x + h2;
+        let sine = |y: f64| y / (d2 + y * y).sqrt();
         let s = sine(self.low.y) + u.y * (sine(self.high.y) - sine(self.low.y));
-        let y = s * d / sqrt_nonneg(1.0 - s * s);
+        let y = s * (d2 / (1.0 - s * s)).sqrt();
         (x, y.clamp(self.low.y, self.high.y))
     }
 }

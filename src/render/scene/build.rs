@@ -4,13 +4,13 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::super::RenderError;
 use super::super::lights::{Light, QuadLight};
 use super::super::lobes::inline_brdf;
 use super::super::material::{Material, Materials, PhongEquation};
 use super::super::shapes::{Geometry, Mesh, Owner, Plane, Quad, Sphere, read_obj};
-use super::super::RenderError;
-use super::spec::{MaterialSpec, MeshNormals, SceneSpec};
 use super::CameraSpec;
+use super::spec::{MaterialSpec, MeshNormals, SceneSpec};
 
 /// A scene to be rendered.
 #[derive(Debug)]
@@ -116,9 +116,10 @@ fn common_origin(spec: &SceneSpec, meshes: &[(Mesh, Owner)]) -> DVec3 {
 }
 
 fn lights(spec: &SceneSpec, origin: DVec3) -> Vec<(Light, Option<Quad>)> {
-    let points = spec.lights.point.iter().map(|l| {
-        (Light::Point { position: DVec3::from(l.position) - origin, intensity: l.intensity.into() }, None)
-    });
+    let points =
+        spec.lights.point.iter().map(|l| {
+            (Light::Point { position: DVec3::from(l.position) - origin, intensity: l.intensity.into() }, None)
+        });
     let directional = spec.lights.directional.iter().map(|l| {
         (Light::Directional { toward: DVec3::from(l.toward).normalize(), irradiance: l.irradiance.into() }, None)
     });
@@ -136,16 +137,18 @@ fn geometry(
     mut meshes: Vec<(Mesh, Owner)>,
     lights: &[(Light, Option<Quad>)],
 ) -> Geometry {
-    let spheres = spec.spheres.iter().map(|s| {
-        (Sphere { center: DVec3::from(s.center) - origin, radius: s.radius }, owner(&s.material))
-    });
+    let spheres = spec
+        .spheres
+        .iter()
+        .map(|s| (Sphere { center: DVec3::from(s.center) - origin, radius: s.radius }, owner(&s.material)));
     let planes = spec.planes.iter().map(|p| {
         let plane = Plane { point: DVec3::from(p.point) - origin, normal: DVec3::from(p.normal).normalize() };
         (plane, owner(&p.material))
     });
-    let quads = spec.quads.iter().map(|q| {
-        (Quad::new(DVec3::from(q.center) - origin, q.u.into(), q.v.into()), owner(&q.material))
-    });
+    let quads = spec
+        .quads
+        .iter()
+        .map(|q| (Quad::new(DVec3::from(q.center) - origin, q.u.into(), q.v.into()), owner(&q.material)));
     let shining = lights.iter().enumerate().filter_map(|(i, (_, quad))| Some(((*quad)?, Owner::Light(i))));
     meshes.iter_mut().flat_map(|(mesh, _)| mesh.triangles.iter_mut().flatten()).for_each(|p| *p -= origin);
     Geometry::new(spheres.collect(), planes.collect(), quads.chain(shining).collect(), meshes)

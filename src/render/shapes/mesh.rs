@@ -38,7 +38,8 @@ fn whole_file(path: &Path, message: String) -> RenderError {
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<tobj::Model>, tobj::LoadError> {
-    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let options =
+        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
     let no_materials = |_: &Path| Ok((Vec::new(), std::collections::HashMap::default()));
     tobj::load_obj_buf(&mut BufReader::new(bytes), &options, no_materials).map(|(models, _)| models)
 }
