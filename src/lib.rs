@@ -9,5 +9,7 @@ pub mod control;
 pub mod fit;
 pub mod geometry;
 pub mod gonio;
+pub mod image;
 pub mod measurement;
 pub mod numeric;
+pub mod render;

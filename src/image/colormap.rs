@@ -1,0 +1,140 @@
+//! False colours, and pictures of differences.
+
+use super::{Bitmap, Image, ImageError};
+
+/// What a value looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColorMap {
+    /// Blue, white, red: signed values, white is 0. ColorBrewer's `RdBu` (Harrower & Brewer 2003), safe for colour-blind eyes.
+    Diverging,
+    /// Dark blue to yellow, equal steps to the eye: values from 0 up. Anchors of viridis (Smith & van der Walt 2015).
+    Sequential,
+}
+
+const DIVERGING: [[u8; 3]; 11] = [
+    [5, 48, 97],
+    [33, 102, 172],
+    [67, 147, 195],
+    [146, 197, 222],
+    [209, 229, 240],
+    [247, 247, 247],
+    [253, 219, 199],
+    [244, 165, 130],
+    [214, 96, 77],
+    [178, 24, 43],
+    [103, 0, 31],
+];
+
+const SEQUENTIAL: [[u8; 3]; 9] = [
+    [68, 1, 84],
+    [71, 44, 122],
+    [59, 81, 139],
+    [44, 113, 142],
+    [33, 144, 141],
+    [39, 173, 129],
+    [92, 200, 99],
+    [170, 220, 50],
+    [253, 231, 37],
+];
+
+/// What is unknown looks like this.
+pub const UNKNOWN: [u8; 3] = [150, 150, 150];
+
+impl ColorMap {
+    /// Colour of a position `t` in [0, 1] along the map; beyond it the ends.
+    #[must_use]
+    pub fn color(self, t: f64) -> [u8; 3] {
+        let anchors: &[[u8; 3]] = match self {
+            Self::Diverging => &DIVERGING,
+            Self::Sequential => &SEQUENTIAL,
+        };
+        let position = t.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
+        let i = (position as usize).min(anchors.len() - 2);
+        let f = position - i as f64;
+        std::array::from_fn(|c| (f64::from(anchors[i][c]) * (1.0 - f) + f64::from(anchors[i + 1][c]) * f).round() as u8)
+    }
+}
+
+/// A false-colour picture of a difference and what its colours mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DifferenceMap {
+    /// The picture; unknown pixels are grey.
+    pub bitmap: Bitmap,
+    /// The ends of the scale are −`range` and +`range`, W/(sr·m²).
+    pub range: f64,
+}
+
+/// The signed difference of luminance, picture less reference, from −`range` to `range`. Without a range it is the 99.5th
+/// percentile of the absolute difference, rounded up to 1, 2 or 5 times a power of ten.
+///
+/// # Errors
+/// [`ImageError::Sizes`] where the sizes differ.
+pub fn difference_map(image: &Image, reference: &Image, range: Option<f64>) -> Result<DifferenceMap, ImageError> {
+    image.check_same_size(reference)?;
+    let differences: Vec<Option<f64>> = (0..image.radiance.len())
+        .map(|i| {
+            let known = !image.is_masked(i) && !reference.is_masked(i);
+            known.then(|| luminance(image.radiance[i]) - luminance(reference.radiance[i]))
+        })
+        .collect();
+    let range = range.unwrap_or_else(|| {
+        let mut sizes: Vec<f64> = differences.iter().flatten().map(|d| d.abs()).filter(|d| d.is_finite()).collect();
+        sizes.sort_by(f64::total_cmp);
+        round_up(sizes.get(sizes.len() * 995 / 1000).copied().unwrap_or(0.0))
+    });
+    let color = |d: &Option<f64>| match d {
+        None => UNKNOWN,
+        Some(d) if d.is_nan() => [255, 0, 255],
+        Some(d) => ColorMap::Diverging.color(0.5 + 0.5 * d / range),
+    };
+    let pixels = differences.iter().map(color).collect();
+    Ok(DifferenceMap { bitmap: Bitmap { width: image.width, height: image.height, pixels }, range })
+}
+
+/// Luminance of linear sRGB (Rec. ITU-R BT.709).
+fn luminance(p: [f64; 3]) -> f64 {
+    0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]
+}
+
+/// The next 1, 2 or 5 times a power of ten; 1 for 0.
+fn round_up(x: f64) -> f64 {
+    if x <= 0.0 {
+        return 1.0;
+    }
+    let decade = 10f64.powf(x.log10().floor());
+    let steps = [1.0, 2.0, 5.0];
+    steps.iter().map(|s| s * decade).find(|r| *r >= x * (1.0 - 1e-12)).unwrap_or(10.0 * decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_is_zero_and_the_ends_are_the_range() {
+        let picture = |values: [f64; 4]| Image {
+            width: 4,
+            height: 1,
+            radiance: values.map(|v| [v; 3]).to_vec(),
+            mask: Some(vec![0.0, 0.0, 0.0, 1.0]),
+            ..Image::default()
+        };
+        let map = difference_map(&picture([1.0, 3.0, 2.0, 9.0]), &picture([2.0, 2.0, 2.0, 2.0]), None).unwrap();
+        assert_eq!(map.range, 1.0);
+        assert_eq!(map.bitmap.pixels, [DIVERGING[0], DIVERGING[10], DIVERGING[5], UNKNOWN]);
+    }
+
+    #[test]
+    fn ranges_are_round_numbers() {
+        for (x, want) in [(0.0, 1.0), (1.0, 1.0), (1.1e-5, 2e-5), (4.0, 5.0), (7e9, 1e10), (0.002, 0.002)] {
+            assert!((round_up(x) / want - 1.0).abs() < 1e-12, "{x}: {}", round_up(x));
+        }
+    }
+
+    #[test]
+    fn colors_run_from_end_to_end() {
+        assert_eq!(ColorMap::Sequential.color(-1.0), SEQUENTIAL[0]);
+        assert_eq!(ColorMap::Sequential.color(1.0), SEQUENTIAL[8]);
+        assert_eq!(ColorMap::Diverging.color(0.55), [250, 233, 223]);
+    }
+}

@@ -1,0 +1,231 @@
+//! In which numbers two pictures differ, and whether they differ by more than their noise.
+
+use serde::Serialize;
+
+use super::{Image, ImageError};
+use crate::numeric::stats::{sidak, two_sided_p};
+
+/// Added to the squared reference in [`Comparison::rel_mse`], so that dark pixels do not dominate, (W/(sr·m²))².
+const REL_MSE_FLOOR: f64 = 1e-2;
+
+/// Differences between a picture and its reference over all pixels that neither masks, all channels alike.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Pixels compared.
+    pub pixels: usize,
+    /// Pixels left out because one of the pictures masks them.
+    pub masked: usize,
+    /// √ mean (x − ref)², W/(sr·m²).
+    pub rmse: f64,
+    /// mean (x − ref)²/(ref² + 0.01).
+    pub rel_mse: f64,
+    /// 20 log₁₀(largest value of the reference / rmse), dB; `None` where the pictures are the same, or the reference is black.
+    pub psnr: Option<f64>,
+    /// Largest |x − ref|, W/(sr·m²).
+    pub max_abs: f64,
+    /// Mean per channel of the picture.
+    pub mean: [f64; 3],
+    /// Mean per channel of the reference.
+    pub reference_mean: [f64; 3],
+    /// Values of either picture that are not finite; they make the numbers above not finite too.
+    pub not_finite: usize,
+    /// Whether the differences exceed the noise; `None` where neither picture knows its standard errors.
+    pub significance: Option<Significance>,
+}
+
+/// A test of every pixel and channel: z = (x − ref)/√(σ² + σ_ref²), a picture without standard errors counting as exact. Half a unit
+/// in the last place of the 32-bit floats of a file counts as noise.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Significance {
+    /// Number of tests: pixels × channels whose noise is known.
+    pub tests: usize,
+    /// Largest |z|.
+    pub max_z: f64,
+    /// Column, row and channel of the largest |z|.
+    pub at: (usize, usize, usize),
+    /// Probability that the largest of as many independent |z| is this large by chance (Šidák).
+    pub p: f64,
+    /// Mean z²: 1 where pictures differ by nothing but their noise.
+    pub mean_z2: f64,
+    /// Whether the pictures differ significantly, at 1 %.
+    pub differs: bool,
+}
+
+/// Compares a picture with its reference.
+///
+/// # Errors
+/// [`ImageError::Sizes`] where the sizes differ, [`ImageError::Layer`] where a layer does not fit its picture.
+pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, ImageError> {
+    image.check_same_size(reference)?;
+    let known: Vec<usize> =
+        (0..image.radiance.len()).filter(|i| !image.is_masked(*i) && !reference.is_masked(*i)).collect();
+    let count = (3 * known.len()) as f64;
+    let (mut squares, mut relative, mut max_abs, mut peak) = (0.0, 0.0, 0.0f64, 0.0f64);
+    let (mut mean, mut reference_mean, mut not_finite) = ([0.0; 3], [0.0; 3], 0);
+    for &i in &known {
+        for c in 0..3 {
+            let (x, r) = (image.radiance[i][c], reference.radiance[i][c]);
+            let d2 = (x - r) * (x - r);
+            squares += d2;
+            relative += d2 / (r * r + REL_MSE_FLOOR);
+            max_abs = if (x - r).is_nan() { f64::NAN } else { larger(max_abs, (x - r).abs()) };
+            peak = peak.max(r);
+            mean[c] += x / known.len() as f64;
+            reference_mean[c] += r / known.len() as f64;
+            not_finite += usize::from(!x.is_finite()) + usize::from(!r.is_finite());
+        }
+    }
+    let share = |sum: f64| if known.is_empty() { 0.0 } else { sum / count };
+    let rmse = share(squares).sqrt();
+    Ok(Comparison {
+        pixels: known.len(),
+        masked: image.radiance.len() - known.len(),
+        rmse,
+        rel_mse: share(relative),
+        psnr: (rmse > 0.0 && peak > 0.0).then(|| 20.0 * (peak / rmse).log10()),
+        max_abs,
+        mean,
+        reference_mean,
+        not_finite,
+        significance: significance(image, reference, &known),
+    })
+}
+
+fn significance(image: &Image, reference: &Image, known: &[usize]) -> Option<Significance> {
+    if image.standard_error.is_none() && reference.standard_error.is_none() {
+        return None;
+    }
+    let error = |of: &Image, i: usize, c: usize| of.standard_error.as_ref().map_or(0.0, |errors| errors[i][c]);
+    let (mut tests, mut max_z, mut at, mut sum) = (0usize, 0.0, (0, 0, 0), 0.0);
+    for &i in known {
+        for c in 0..3 {
+            let (x, r) = (image.radiance[i][c], reference.radiance[i][c]);
+            let noise = error(image, i, c).hypot(error(reference, i, c));
+            if noise == f64::INFINITY {
+                continue; // a single sample: its noise is not known
+            }
+            let rounding = 0.5 * f64::from(f32::EPSILON) * x.abs().max(r.abs());
+            let z = if x == r { 0.0 } else { (x - r).abs() / noise.hypot(rounding) };
+            tests += 1;
+            sum += z * z;
+            if z > max_z || z.is_nan() {
+                (max_z, at) = (z, (i % image.width, i / image.width, c));
+            }
+        }
+    }
+    let p = two_sided_p(max_z);
+    let by_chance = -f64::exp_m1(tests as f64 * f64::ln_1p(-p));
+    let mean_z2 = if tests == 0 { 0.0 } else { sum / tests as f64 };
+    Some(Significance {
+        tests,
+        max_z,
+        at,
+        p: by_chance,
+        mean_z2,
+        differs: tests > 0 && (p.is_nan() || p < sidak(0.01, tests)),
+    })
+}
+
+/// The larger of two values; NaN wins.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
+}
+
+impl Image {
+    /// Whether a part of pixel `i` is unknown.
+    #[must_use]
+    pub fn is_masked(&self, i: usize) -> bool {
+        self.mask.as_ref().and_then(|mask| mask.get(i)).is_some_and(|share| *share > 0.0)
+    }
+
+    /// Whether two pictures have the same size and layers of that size.
+    pub(super) fn check_same_size(&self, reference: &Self) -> Result<(), ImageError> {
+        let (image, other) = ((self.width, self.height), (reference.width, reference.height));
+        if image != other {
+            return Err(ImageError::Sizes { image, reference: other });
+        }
+        self.check_layers()?;
+        reference.check_layers()
+    }
+
+    /// Whether all layers have as many pixels as the picture.
+    pub(super) fn check_layers(&self) -> Result<(), ImageError> {
+        let (width, height) = (self.width, self.height);
+        let layers = [
+            ("radiance", Some(self.radiance.len())),
+            ("stderr", self.standard_error.as_ref().map(Vec::len)),
+            ("mask", self.mask.as_ref().map(Vec::len)),
+        ];
+        for (layer, found) in layers {
+            if let Some(found) = found.filter(|found| *found != width * height) {
+                return Err(ImageError::Layer { layer, width, height, found });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::{Purpose, stream};
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn picture(width: usize, height: usize, value: impl Fn(usize) -> f64) -> Image {
+        let radiance = (0..width * height).map(|i| [value(3 * i), value(3 * i + 1), value(3 * i + 2)]).collect();
+        Image { width, height, radiance, ..Image::default() }
+    }
+
+    #[test]
+    fn numbers_of_a_constant_difference_are_closed_forms() {
+        for (reference, d) in [(0.5, 0.1), (0.0, 1e-3), (4.0, -1.0)] {
+            let c = compare(&picture(8, 4, |_| reference + d), &picture(8, 4, |_| reference)).unwrap();
+            assert!((c.rmse - d.abs()).abs() < 1e-15 && (c.max_abs - d.abs()).abs() < 1e-15);
+            assert!((c.rel_mse / (d * d / (reference * reference + 0.01)) - 1.0).abs() < 1e-12);
+            let psnr = (reference > 0.0).then(|| 20.0 * (reference / d.abs()).log10());
+            assert!(psnr.zip(c.psnr).is_none_or(|(a, b)| (a - b).abs() < 1e-9) && psnr.is_some() == c.psnr.is_some());
+            assert!((c.mean[1] - reference - d).abs() < 1e-14 && c.significance.is_none());
+        }
+        let same = compare(&picture(3, 3, |i| i as f64), &picture(3, 3, |i| i as f64)).unwrap();
+        assert_eq!((same.rmse, same.psnr, same.max_abs), (0.0, None, 0.0));
+    }
+
+    #[test]
+    fn masked_pixels_do_not_count_and_nan_is_not_hidden() {
+        let mut image = picture(4, 1, |i| if i < 3 { 1e9 } else { 1.0 });
+        let reference = picture(4, 1, |_| 1.0);
+        assert!(compare(&image, &reference).unwrap().max_abs > 1e8);
+        image.mask = Some(vec![0.25, 0.0, 0.0, 0.0]);
+        let c = compare(&image, &reference).unwrap();
+        assert_eq!((c.rmse, c.pixels, c.masked), (0.0, 3, 1));
+        image.radiance[2][1] = f64::NAN;
+        let c = compare(&image, &reference).unwrap();
+        assert!(c.rmse.is_nan() && c.max_abs.is_nan() && c.not_finite == 1);
+    }
+
+    #[test]
+    fn sizes_and_layers_must_agree() {
+        let error = compare(&picture(4, 2, |_| 0.0), &picture(2, 4, |_| 0.0)).unwrap_err();
+        assert!(error.to_string().contains("4x2") && error.to_string().contains("2x4"), "{error}");
+        let mut broken = picture(4, 2, |_| 0.0);
+        broken.mask = Some(vec![0.0; 3]);
+        assert!(matches!(compare(&broken, &picture(4, 2, |_| 0.0)), Err(ImageError::Layer { layer: "mask", .. })));
+    }
+
+    #[test]
+    fn noise_is_accepted_and_a_six_sigma_pixel_is_found() {
+        let noise: Vec<f64> = {
+            let mut rng = stream(5, Purpose::Study, 0);
+            (0..3 * 64 * 64).map(|_| StandardNormal.sample(&mut rng)).collect()
+        };
+        let mut image = picture(64, 64, |i| 1.0 + 0.01 * noise[i]);
+        image.standard_error = Some(vec![[0.01; 3]; 64 * 64]);
+        let reference = picture(64, 64, |_| 1.0);
+        let s = compare(&image, &reference).unwrap().significance.unwrap();
+        // mean z² of 12,288 tests: 1 ± 5·√(2/12288).
+        assert!(!s.differs && (s.mean_z2 - 1.0).abs() < 5.0 * (2.0f64 / 12288.0).sqrt(), "{s:?}");
+        image.radiance[64 * 7 + 9][2] = 1.06;
+        let s = compare(&image, &reference).unwrap().significance.unwrap();
+        assert!(s.differs && s.at == (9, 7, 2) && (s.max_z - 6.0).abs() < 1e-4, "{s:?}");
+    }
+}

@@ -1,0 +1,136 @@
+//! OpenEXR files: `R`, `G`, `B` hold the radiance, so any viewer opens it; `stderr.R` … its standard error, `mask` the unknown share.
+//!
+//! Values are written as 32-bit floats, compressed without loss; how the picture came about stands in text attributes named
+//! `goniofit.…`.
+
+use std::path::Path;
+
+use exr::prelude as ex;
+use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
+
+use super::{Image, ImageError, Metadata};
+
+type Channel = ex::AnyChannel<ex::FlatSamples>;
+type Attributes = std::collections::HashMap<ex::Text, ex::AttributeValue>;
+
+/// Writes a picture with its layers. The file appears whole or not at all.
+///
+/// # Errors
+/// [`ImageError::Layer`] where a layer's length disagrees with the size, [`ImageError::Io`] where the disk refuses.
+pub fn write_exr(path: &Path, image: &Image) -> Result<(), ImageError> {
+    let channels = channels(image)?;
+    let mut attributes = ex::LayerAttributes::default();
+    for (key, value) in texts(&image.metadata) {
+        attributes.other.insert(key.into(), ex::AttributeValue::Text(value.as_str().into()));
+    }
+    attributes.software_name = image.metadata.program.as_deref().map(ex::Text::from);
+    let encoding = ex::Encoding { compression: ex::Compression::ZIP16, ..ex::Encoding::default() };
+    let layer = ex::Layer::new(
+        (image.width, image.height),
+        attributes,
+        encoding,
+        ex::AnyChannels::sort(channels.into_iter().collect()),
+    );
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let io = |source| ImageError::Io { path: path.into(), source };
+    ex::Image::from_layer(layer)
+        .write()
+        .to_buffered(&mut bytes)
+        .map_err(|e| io(std::io::Error::other(e.to_string())))?;
+    super::write_whole(path, bytes.get_ref())
+}
+
+/// Reads a picture: its first layer that has `R`, `G` and `B` (or `Y` alone), and the layers written by [`write_exr`].
+///
+/// # Errors
+/// [`ImageError`] naming the file and what was expected.
+pub fn read_exr(path: &Path) -> Result<Image, ImageError> {
+    let bytes = std::fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })?;
+    let invalid =
+        |e: &exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
+    let read = ex::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+    let file = read.non_parallel().from_buffered(std::io::Cursor::new(bytes)).map_err(|e| invalid(&e))?;
+    let found = || file.layer_data.iter().flat_map(|l| &l.channel_data.list).map(|c| c.name.to_string());
+    let unsupported = || ImageError::Unsupported {
+        path: path.into(),
+        expected: "channels R, G, B, or Y alone".into(),
+        found: format!("channels {}", found().collect::<Vec<_>>().join(", ")),
+    };
+    let layer = file.layer_data.iter().find(|l| rgb(&l.channel_data.list, "").is_some()).ok_or_else(unsupported)?;
+    let list = &layer.channel_data.list;
+    Ok(Image {
+        width: layer.size.0,
+        height: layer.size.1,
+        radiance: rgb(list, "").ok_or_else(unsupported)?,
+        standard_error: rgb(list, "stderr."),
+        mask: plane(list, "mask"),
+        metadata: metadata(&layer.attributes.other),
+    })
+}
+
+fn channels(image: &Image) -> Result<Vec<Channel>, ImageError> {
+    let pixels = image.width * image.height;
+    let check = |layer, found| {
+        let (width, height) = (image.width, image.height);
+        if found == pixels { Ok(()) } else { Err(ImageError::Layer { layer, width, height, found }) }
+    };
+    check("radiance", image.radiance.len())?;
+    let samples = |values: Vec<f32>| ex::FlatSamples::F32(values);
+    let mut channels = Vec::new();
+    let mut add = |prefix: &str, values: &[[f64; 3]]| {
+        for (i, name) in ["R", "G", "B"].iter().enumerate() {
+            let plane = values.iter().map(|p| p[i] as f32).collect();
+            channels.push(Channel::new(format!("{prefix}{name}").as_str(), samples(plane)));
+        }
+    };
+    add("", &image.radiance);
+    if let Some(error) = &image.standard_error {
+        check("stderr", error.len())?;
+        add("stderr.", error);
+    }
+    if let Some(mask) = &image.mask {
+        check("mask", mask.len())?;
+        channels.push(Channel::new("mask", samples(mask.iter().map(|m| *m as f32).collect())));
+    }
+    Ok(channels)
+}
+
+fn texts(metadata: &Metadata) -> Vec<(&'static str, String)> {
+    [
+        ("goniofit.scene", metadata.scene.clone()),
+        ("goniofit.seed", metadata.seed.map(|v| v.to_string())),
+        ("goniofit.samples", metadata.samples.map(|v| v.to_string())),
+        ("goniofit.seconds", metadata.seconds.map(|v| v.to_string())),
+        ("goniofit.program", metadata.program.clone()),
+    ]
+    .into_iter()
+    .filter_map(|(key, value)| Some((key, value?)))
+    .collect()
+}
+
+fn metadata(attributes: &Attributes) -> Metadata {
+    let text = |key: &str| match attributes.get(&ex::Text::from(key)) {
+        Some(ex::AttributeValue::Text(value)) => Some(value.to_string()),
+        _ => None,
+    };
+    Metadata {
+        scene: text("goniofit.scene"),
+        seed: text("goniofit.seed").and_then(|v| v.parse().ok()),
+        samples: text("goniofit.samples").and_then(|v| v.parse().ok()),
+        seconds: text("goniofit.seconds").and_then(|v| v.parse().ok()),
+        program: text("goniofit.program"),
+    }
+}
+
+fn plane(list: &[Channel], name: &str) -> Option<Vec<f64>> {
+    let channel = list.iter().find(|c| c.name.eq(name))?;
+    Some(channel.sample_data.values_as_f32().map(f64::from).collect())
+}
+
+fn rgb(list: &[Channel], prefix: &str) -> Option<Vec<[f64; 3]>> {
+    let named = |name: &str| plane(list, &format!("{prefix}{name}"));
+    if let (Some(r), Some(g), Some(b)) = (named("R"), named("G"), named("B")) {
+        return Some(r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect());
+    }
+    Some(named("Y")?.into_iter().map(|y| [y; 3]).collect())
+}

@@ -1,0 +1,69 @@
+//! Pictures: EXR and PNG in and out, per-pixel metrics, and sheets that show several side by side.
+//!
+//! In: radiance per pixel in W/(sr·m²), linear RGB (sRGB's primaries), with standard errors and a mask where they are known. Out: files, and
+//! the numbers in which two pictures differ. The one decision to know: numbers are always taken from linear radiance;
+//! 8-bit pictures are only for eyes.
+
+mod bitmap;
+mod colormap;
+mod compare;
+mod error;
+mod exr_file;
+pub mod sheet;
+mod tone;
+
+pub use bitmap::{Bitmap, write_png};
+pub use colormap::{ColorMap, DifferenceMap, difference_map};
+pub use compare::{Comparison, Significance, compare};
+pub use error::ImageError;
+pub use exr_file::{read_exr, write_exr};
+pub use tone::{develop, exposure_for, srgb_encode};
+
+/// A picture of linear radiance with its layers. Pixels run along rows, row 0 on top.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Image {
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Radiance, W/(sr·m²); `width`·`height` pixels.
+    pub radiance: Vec<[f64; 3]>,
+    /// Standard error of the radiance, where it is known; the same shape.
+    pub standard_error: Option<Vec<[f64; 3]>>,
+    /// Share of the pixel that is unknown, 0 to 1, where anything can be; one value a pixel.
+    pub mask: Option<Vec<f64>>,
+    /// How the picture came about.
+    pub metadata: Metadata,
+}
+
+/// How a picture came about, as far as is known.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Metadata {
+    /// Name of the scene.
+    pub scene: Option<String>,
+    /// Seed of the random numbers.
+    pub seed: Option<u64>,
+    /// Samples per pixel.
+    pub samples: Option<u32>,
+    /// Rendering time, s.
+    pub seconds: Option<f64>,
+    /// Program and version.
+    pub program: Option<String>,
+}
+
+/// Writes a file by way of a temporary one beside it, so that it appears whole or not at all.
+fn write_whole(path: &std::path::Path, bytes: &[u8]) -> Result<(), ImageError> {
+    use std::io::Write;
+    let io = |source| ImageError::Io { path: path.into(), source };
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| std::path::Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666)); // less the umask: as any other file
+    }
+    let mut file = builder.tempfile_in(folder).map_err(io)?;
+    file.write_all(bytes).map_err(io)?;
+    file.persist(path).map_err(|e| io(e.error))?;
+    Ok(())
+}

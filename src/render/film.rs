@@ -1,0 +1,236 @@
+//! The film: passes over the picture, and what every pixel has gathered.
+
+use std::time::Instant;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::RenderError;
+use super::camera::Camera;
+use super::integrator::{PathResult, Strategy, Tracer};
+use super::scene::{Scene, SceneSpec};
+use crate::control::Control;
+use crate::image::{Image, Metadata};
+use crate::numeric::float::sqrt_nonneg;
+use crate::numeric::random::{Purpose, RngExt, Stream, stream};
+
+/// Samples of a pixel in one pass at most.
+const PASS: u32 = 32;
+
+/// What to render.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Width, pixels, 1 to 16384.
+    pub width: u32,
+    /// Height, pixels, 1 to 16384.
+    pub height: u32,
+    /// Samples per pixel, 1 to 2²⁴.
+    pub samples: u32,
+    /// Key of all random numbers.
+    pub seed: u64,
+    /// How lights are found.
+    pub strategy: Strategy,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { width: 512, height: 512, samples: 64, seed: 0, strategy: Strategy::default() }
+    }
+}
+
+impl Options {
+    /// The resolution and samples that a scene file asks for.
+    #[must_use]
+    pub fn of(spec: &SceneSpec) -> Self {
+        let [width, height] = spec.film.resolution;
+        Self { width, height, samples: spec.film.samples, ..Self::default() }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`RenderError::Field`] for the first field that is out of range.
+    pub fn validate(&self) -> Result<(), RenderError> {
+        let fields = [("width", self.width, 16384), ("height", self.height, 16384), ("samples", self.samples, 1 << 24)];
+        for (field, value, most) in fields {
+            if !(1..=most).contains(&value) {
+                let (origin, field, value) = ("render options".into(), field.into(), value.to_string());
+                return Err(RenderError::Field { origin, field, value, constraint: format!("from 1 to {most}") });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What one pixel has gathered. Sums are taken about the first sample, so that the variance of nearly equal samples, or of
+/// samples of 10²⁰, keeps its digits.
+#[derive(Debug, Clone)]
+struct Pixel {
+    rng: Stream,
+    samples: u32,
+    unknown: u32,
+    first: DVec3,
+    sum: DVec3,
+    squares: DVec3,
+}
+
+impl Pixel {
+    fn new(seed: u64, index: u64) -> Self {
+        let rng = stream(seed, Purpose::Pixel, index);
+        Self { rng, samples: 0, unknown: 0, first: DVec3::ZERO, sum: DVec3::ZERO, squares: DVec3::ZERO }
+    }
+
+    fn add(&mut self, path: &PathResult) {
+        if self.samples == 0 {
+            self.first = path.radiance;
+        }
+        let d = path.radiance - self.first;
+        self.sum += d;
+        self.squares += d * d;
+        self.samples += 1;
+        self.unknown += u32::from(path.unknown);
+    }
+
+    fn mean(&self) -> DVec3 {
+        if self.samples == 0 { DVec3::ZERO } else { self.first + self.sum / f64::from(self.samples) }
+    }
+
+    fn standard_error(&self) -> DVec3 {
+        let n = f64::from(self.samples);
+        if n < 2.0 {
+            return DVec3::INFINITY;
+        }
+        let mean = self.sum / n;
+        let variance = (self.squares - n * mean * mean) / (n - 1.0);
+        // Round-off of the squares can reach below 0; NaN stays NaN.
+        DVec3::from_array(variance.to_array().map(|v| sqrt_nonneg(v.clamp(0.0, f64::INFINITY) / n)))
+    }
+}
+
+/// A rendered picture: per pixel and channel the mean of its samples and its standard error. Row 0 is on top.
+#[derive(Debug, Clone)]
+pub struct Film {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Wall-clock time that it took, s.
+    pub seconds: f64,
+    /// Samples that were not finite; each of them leaves its pixel not finite. Always 0 but for a mistake of the program.
+    pub not_finite: u64,
+    scene: String,
+    seed: u64,
+    pixels: Vec<Pixel>,
+}
+
+impl Film {
+    /// Mean radiance of the pixel in column x and row y, W/(sr·m²); `None` outside of the picture.
+    #[must_use]
+    pub fn radiance(&self, x: u32, y: u32) -> Option<DVec3> {
+        Some(self.pixel(x, y)?.mean())
+    }
+
+    /// Standard error of [`Film::radiance`]; infinite below two samples.
+    #[must_use]
+    pub fn standard_error(&self, x: u32, y: u32) -> Option<DVec3> {
+        Some(self.pixel(x, y)?.standard_error())
+    }
+
+    /// Number of samples of the pixel with the fewest: fewer than asked for where the work was stopped.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.pixels.iter().map(|p| p.samples).min().unwrap_or(0)
+    }
+
+    /// Number of all samples taken.
+    #[must_use]
+    pub fn total_samples(&self) -> u64 {
+        self.pixels.iter().map(|p| u64::from(p.samples)).sum()
+    }
+
+    /// The picture with its layers. `mask` is the share of a pixel's paths that met a direction where a material is unknown,
+    /// and 1 where there are no samples.
+    #[must_use]
+    pub fn to_image(&self) -> Image {
+        let share = |p: &Pixel| if p.samples == 0 { 1.0 } else { f64::from(p.unknown) / f64::from(p.samples) };
+        Image {
+            width: self.width as usize,
+            height: self.height as usize,
+            radiance: self.pixels.iter().map(|p| p.mean().to_array()).collect(),
+            standard_error: Some(self.pixels.iter().map(|p| p.standard_error().to_array()).collect()),
+            mask: Some(self.pixels.iter().map(share).collect()),
+            metadata: Metadata {
+                scene: Some(self.scene.clone()),
+                seed: Some(self.seed),
+                samples: Some(self.samples()),
+                seconds: Some(self.seconds),
+                program: Some(format!("goniofit {}", env!("CARGO_PKG_VERSION"))),
+            },
+        }
+    }
+
+    fn pixel(&self, x: u32, y: u32) -> Option<&Pixel> {
+        (x < self.width).then(|| self.pixels.get(y as usize * self.width as usize + x as usize))?
+    }
+}
+
+/// Renders a scene on the current thread pool.
+///
+/// The picture is rendered in passes of a growing number of samples per pixel. When the work is stopped, every pixel keeps what
+/// it has, so a stop after the first pass leaves a whole picture with fewer samples. The bits of the result depend on nothing
+/// but the scene, the options and, when stopped, on the number of samples that each pixel got.
+///
+/// # Errors
+/// [`RenderError::Field`] where an option is out of range.
+pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<Film, RenderError> {
+    options.validate()?;
+    let start = Instant::now();
+    let width = options.width as usize;
+    let pixels = u64::from(options.width) * u64::from(options.height);
+    let mut film = Film {
+        width: options.width,
+        height: options.height,
+        seconds: 0.0,
+        not_finite: 0,
+        scene: scene.name.clone(),
+        seed: options.seed,
+        pixels: (0..pixels).into_par_iter().map(|index| Pixel::new(options.seed, index)).collect(),
+    };
+    let camera = Camera::new(&scene.camera, scene.origin, options.width, options.height);
+    let tracer = Tracer::new(scene, options.strategy);
+    control.progress.start("render", u64::from(options.samples) * u64::from(options.height));
+    let mut done = 0;
+    while done < options.samples && !control.stop.requested() {
+        let pass = done.clamp(1, PASS).min(options.samples - done);
+        let rows = film.pixels.par_chunks_mut(width).enumerate();
+        let bad = rows.map(|(y, row)| {
+            if control.stop.requested() {
+                return 0;
+            }
+            let bad = render_row(&tracer, &camera, y, row, pass);
+            control.progress.advance(u64::from(pass));
+            bad
+        });
+        film.not_finite += bad.sum::<u64>();
+        done += pass;
+    }
+    control.progress.finish();
+    film.seconds = start.elapsed().as_secs_f64();
+    Ok(film)
+}
+
+/// Adds `samples` paths to every pixel of a row; the number of those that were not finite.
+fn render_row(tracer: &Tracer<'_>, camera: &Camera, y: usize, row: &mut [Pixel], samples: u32) -> u64 {
+    let mut bad = 0;
+    for (x, pixel) in row.iter_mut().enumerate() {
+        for _ in 0..samples {
+            let jitter = DVec2::new(pixel.rng.random(), pixel.rng.random());
+            let ray = camera.ray(DVec2::new(x as f64, y as f64) + jitter);
+            let path = tracer.trace(ray, &mut pixel.rng);
+            debug_assert!(path.radiance.is_finite(), "pixel ({x}, {y}): radiance {}", path.radiance);
+            bad += u64::from(!path.radiance.is_finite());
+            pixel.add(&path);
+        }
+    }
+    bad
+}

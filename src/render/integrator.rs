@@ -1,0 +1,251 @@
+//! The path tracer: radiance along a ray as the expected value of one random path.
+
+use std::f64::consts::FRAC_1_PI;
+
+use glam::{DVec2, DVec3};
+
+use super::material::{Material, PhongEquation, eval_rgb};
+use super::ray::{Ray, SurfacePoint};
+use super::scene::Scene;
+use super::shapes::{Owner, Surface};
+use crate::brdf::Brdf;
+use crate::geometry::{Frame, sampling};
+use crate::numeric::random::{RngExt, Stream};
+
+/// Scattering events before paths may end by chance.
+const ROULETTE_AFTER: u32 = 5;
+
+/// Which directions find the lights that have a surface, and the environment. All three have the same expected value;
+/// they differ in noise.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Strategy {
+    /// Both ways, combined by the power heuristic (Veach 1997).
+    #[default]
+    Combined,
+    /// Only directions drawn from the material: right, but slow for small lights. Shows that the combination is right.
+    MaterialOnly,
+    /// Only directions drawn from the lights: right, but slow for sharp lobes. Shows that the combination is right.
+    LightsOnly,
+}
+
+impl Strategy {
+    /// Weight of a contribution found by one way with density `own`, which the `other` way would have found too.
+    fn weight(self, own: f64, other: f64, by_material: bool) -> f64 {
+        match self {
+            Self::Combined => {
+                let ratio = other / own;
+                1.0 / (1.0 + ratio * ratio)
+            }
+            Self::MaterialOnly => f64::from(u8::from(by_material)),
+            Self::LightsOnly => f64::from(u8::from(!by_material)),
+        }
+    }
+}
+
+/// What one path found.
+#[derive(Debug, Clone, Copy)]
+pub struct PathResult {
+    /// Radiance, W/(sr·m²).
+    pub radiance: DVec3,
+    /// Whether the path asked a material for a value that nobody measured.
+    pub unknown: bool,
+}
+
+/// Where and how the path scattered last.
+#[derive(Debug, Clone, Copy)]
+struct Scatter {
+    position: DVec3,
+    normal: DVec3,
+    pdf: f64,
+}
+
+/// A surface point and the eye's direction, in the local frame of its shading normal.
+struct Vertex {
+    point: SurfacePoint,
+    frame: Frame,
+    wo: DVec3,
+}
+
+/// Walks through a scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Tracer<'a> {
+    scene: &'a Scene,
+    strategy: Strategy,
+    /// Whether a ray can find light at all; where not, the last scattering event needs no ray.
+    rays_find_light: bool,
+}
+
+struct Path {
+    radiance: DVec3,
+    throughput: DVec3,
+    unknown: bool,
+}
+
+impl<'a> Tracer<'a> {
+    /// A tracer for a scene.
+    pub fn new(scene: &'a Scene, strategy: Strategy) -> Self {
+        let surfaces = scene.lights.iter().any(super::lights::Light::has_surface);
+        let rays_find_light = (surfaces || scene.environment.is_some()) && strategy != Strategy::LightsOnly;
+        Self { scene, strategy, rays_find_light }
+    }
+
+    /// Follows one path that starts with `ray` at the camera.
+    pub fn trace(&self, mut ray: Ray, rng: &mut Stream) -> PathResult {
+        let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: false };
+        let mut last: Option<Scatter> = None;
+        for bounce in 0..=self.scene.max_bounces {
+            let Some(surface) = self.scene.geometry.closest(&ray) else {
+                path.radiance += path.throughput * self.environment_found(&ray, last.as_ref());
+                break;
+            };
+            if surface.point.normal.dot(ray.direction) >= 0.0 {
+                break; // the back of anything is black
+            }
+            let material = match surface.owner {
+                Owner::Light(light) => {
+                    path.radiance += path.throughput * self.light_found(light, &surface, last.as_ref());
+                    break;
+                }
+                Owner::Material(material) => &self.scene.materials[material],
+            };
+            if bounce == self.scene.max_bounces {
+                break;
+            }
+            let vertex = Vertex::new(&surface, -ray.direction);
+            if vertex.wo.z <= 0.0 {
+                break;
+            }
+            let Some(next) = self.scatter(material, &vertex, bounce, &mut path, rng) else { break };
+            ray = Ray::new(vertex.point.above(), next.0);
+            last = Some(next.1);
+        }
+        PathResult { radiance: path.radiance, unknown: path.unknown }
+    }
+
+    /// Adds the light that arrives at the vertex directly and draws where the path goes on; `None` where it ends.
+    fn scatter(
+        &self,
+        material: &Material,
+        vertex: &Vertex,
+        bounce: u32,
+        path: &mut Path,
+        rng: &mut Stream,
+    ) -> Option<(DVec3, Scatter)> {
+        let brdf = match material {
+            Material::Black => return None,
+            Material::PhongEquation(equation) => {
+                path.radiance += path.throughput * self.shade(equation, vertex);
+                return None;
+            }
+            Material::Brdf(brdf) => brdf.as_ref(),
+        };
+        self.add_direct(brdf, vertex, path, rng);
+        if bounce + 1 == self.scene.max_bounces && !self.rays_find_light {
+            return None;
+        }
+        let drawn = brdf.sample(vertex.wo, [rng.random(), rng.random(), rng.random()])?;
+        let (f, known) = eval_rgb(brdf, drawn.wi, vertex.wo);
+        path.unknown |= !known;
+        path.throughput *= f * (drawn.wi.z / drawn.pdf);
+        let direction = vertex.frame.to_world(drawn.wi).normalize();
+        let above = vertex.point.normal.dot(direction) > 0.0;
+        let goes_on = above && path.throughput != DVec3::ZERO && survives(bounce, path, rng);
+        let scatter = Scatter { position: vertex.point.position, normal: vertex.frame.normal, pdf: drawn.pdf };
+        goes_on.then_some((direction, scatter))
+    }
+
+    /// Light found by aiming at the lights.
+    fn add_direct(&self, brdf: &dyn Brdf, vertex: &Vertex, path: &mut Path, rng: &mut Stream) {
+        for light in &self.scene.lights {
+            let by_chance = light.has_surface();
+            if by_chance && self.strategy == Strategy::MaterialOnly {
+                continue;
+            }
+            let u = if by_chance { DVec2::new(rng.random(), rng.random()) } else { DVec2::ZERO };
+            let Some(arrival) = light.sample(&vertex.point, u) else { continue };
+            let reflected = self.reflected(brdf, vertex, arrival.wi, arrival.pdf, path);
+            if reflected != DVec3::ZERO && !self.scene.geometry.occluded(&arrival.shadow) {
+                path.radiance += path.throughput * reflected * arrival.irradiance;
+            }
+        }
+        if let Some(radiance) = self.scene.environment
+            && self.strategy != Strategy::MaterialOnly
+        {
+            let local = sampling::cosine_hemisphere(DVec2::new(rng.random(), rng.random()));
+            let pdf = sampling::cosine_hemisphere_pdf(local);
+            let wi = vertex.frame.to_world(local).normalize();
+            let reflected = self.reflected(brdf, vertex, wi, Some(pdf), path);
+            if reflected != DVec3::ZERO && !self.scene.geometry.occluded(&Ray::new(vertex.point.above(), wi)) {
+                path.radiance += path.throughput * reflected * radiance / pdf;
+            }
+        }
+    }
+
+    /// f·cosθi towards the eye for light from the world direction `wi`, times the weight of having aimed there.
+    fn reflected(&self, brdf: &dyn Brdf, vertex: &Vertex, wi: DVec3, pdf: Option<f64>, path: &mut Path) -> DVec3 {
+        let local = vertex.frame.to_local(wi);
+        if local.z <= 0.0 || vertex.point.normal.dot(wi) <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let (f, known) = eval_rgb(brdf, local, vertex.wo);
+        path.unknown |= !known;
+        let weight = pdf.map_or(1.0, |pdf| match self.strategy {
+            Strategy::Combined => self.strategy.weight(pdf, brdf.pdf(local, vertex.wo), false),
+            fixed => fixed.weight(pdf, 0.0, false),
+        });
+        f * (local.z * weight)
+    }
+
+    /// Radiance of a light that a ray ran into, times the weight of having found it so.
+    fn light_found(&self, light: usize, surface: &Surface, last: Option<&Scatter>) -> DVec3 {
+        let light = &self.scene.lights[light];
+        let weight = last
+            .map_or(1.0, |from| self.strategy.weight(from.pdf, light.pdf(from.position, surface.point.position), true));
+        light.radiance() * weight
+    }
+
+    /// Radiance of the environment behind a ray that met nothing, times the weight of having found it so.
+    fn environment_found(&self, ray: &Ray, last: Option<&Scatter>) -> DVec3 {
+        let Some(radiance) = self.scene.environment else { return DVec3::ZERO };
+        let weight = last.map_or(1.0, |from| {
+            let cosine = from.normal.dot(ray.direction).clamp(0.0, f64::INFINITY);
+            self.strategy.weight(from.pdf, FRAC_1_PI * cosine, true)
+        });
+        radiance * weight
+    }
+
+    /// Phong's equation at the vertex.
+    fn shade(&self, equation: &PhongEquation, vertex: &Vertex) -> DVec3 {
+        let mut radiance = equation.ambient;
+        for light in &self.scene.lights {
+            let Some(segment) = light.as_seen_by_equation(&vertex.point) else { continue };
+            let term = equation.light_term(vertex.frame.to_local(segment.direction), vertex.wo);
+            let above = vertex.point.normal.dot(segment.direction) > 0.0;
+            if above && term != DVec3::ZERO && !self.scene.geometry.occluded(&segment) {
+                radiance += term;
+            }
+        }
+        radiance
+    }
+}
+
+impl Vertex {
+    fn new(surface: &Surface, wo: DVec3) -> Self {
+        let frame = Frame::from_normal(surface.shading_normal);
+        Self { point: surface.point, frame, wo: frame.to_local(wo) }
+    }
+}
+
+/// Russian roulette: a path whose throughput has fallen to q < 1 goes on with probability q and counts for 1/q. Its largest
+/// channel is then 1, so roulette never raises a path above what it started with.
+fn survives(bounce: u32, path: &mut Path, rng: &mut Stream) -> bool {
+    if bounce < ROULETTE_AFTER {
+        return true;
+    }
+    let q = path.throughput.abs().max_element();
+    if q >= 1.0 {
+        return true;
+    }
+    path.throughput /= q;
+    rng.random::<f64>() < q
+}

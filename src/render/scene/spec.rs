@@ -1,0 +1,280 @@
+//! The scene file as typed: one struct per table of the TOML, every field with its unit.
+//!
+//! Lengths are metres, angles degrees, colours linear RGB. Unknown keys are errors.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::super::RenderError;
+
+/// A scene file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// Version of the file's format: 1.
+    pub version: u32,
+    /// Name of the scene.
+    pub name: String,
+    /// One line on what the scene shows.
+    #[serde(default)]
+    pub description: String,
+    /// Scattering events of a path at most, 0 to 1000; with 0 only lights are seen.
+    pub max_bounces: u32,
+    /// Name of the material that a caller may replace (`--material`).
+    #[serde(default)]
+    pub subject: Option<String>,
+    /// The camera.
+    pub camera: CameraSpec,
+    /// Resolution and samples when the caller names none.
+    #[serde(default)]
+    pub film: FilmSpec,
+    /// Materials by name.
+    #[serde(default)]
+    pub materials: BTreeMap<String, MaterialSpec>,
+    /// Spheres, lit outside.
+    #[serde(default, rename = "sphere")]
+    pub spheres: Vec<SphereSpec>,
+    /// Infinite planes, lit on the side of the normal.
+    #[serde(default, rename = "plane")]
+    pub planes: Vec<PlaneSpec>,
+    /// Parallelograms, lit on the side of u × v.
+    #[serde(default, rename = "quad")]
+    pub quads: Vec<QuadSpec>,
+    /// Triangle meshes, lit on the side from which a face's vertices run counter-clockwise.
+    #[serde(default, rename = "mesh")]
+    pub meshes: Vec<MeshSpec>,
+    /// Lights.
+    #[serde(default, rename = "light")]
+    pub lights: LightsSpec,
+}
+
+/// A pinhole camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSpec {
+    /// Where the pinhole is, m.
+    pub position: [f64; 3],
+    /// A point in the middle of the picture, m; not the position.
+    pub target: [f64; 3],
+    /// The direction that is up in the picture; not parallel to the line of sight.
+    #[serde(default = "CameraSpec::default_up")]
+    pub up: [f64; 3],
+    /// Full field of view along x, degrees, above 0 and below 180. Pixels are square.
+    pub fov_deg: f64,
+}
+
+impl CameraSpec {
+    const fn default_up() -> [f64; 3] {
+        [0.0, 1.0, 0.0]
+    }
+}
+
+/// What is rendered when the caller does not say.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FilmSpec {
+    /// Width and height, pixels, 1 to 16384 each.
+    pub resolution: [u32; 2],
+    /// Samples per pixel, 1 to 2²⁴.
+    pub samples: u32,
+}
+
+impl Default for FilmSpec {
+    fn default() -> Self {
+        Self { resolution: [512, 512], samples: 64 }
+    }
+}
+
+/// A material: a sum of lobes (`kd`, `phong`), or a `file`, or Phong's `equation`, or `black`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MaterialSpec {
+    /// Weight of a Lambert lobe, kd/π in 1/sr, at least 0.
+    pub kd: Option<[f64; 3]>,
+    /// Normalised Phong lobes that are added.
+    pub phong: Vec<PhongLobeSpec>,
+    /// A fitted material or a measurement that covers enough to be rendered; relative to the scene file.
+    pub file: Option<PathBuf>,
+    /// Phong's equation as a shading rule.
+    pub equation: Option<EquationSpec>,
+    /// Reflects nothing.
+    pub black: bool,
+}
+
+/// The lobe ks·(n+2)/(2π)·cosⁿα in 1/sr, α the angle between wo and the mirror image of wi.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhongLobeSpec {
+    /// Weight, at least 0: the share reflected at normal incidence.
+    pub ks: [f64; 3],
+    /// Exponent n, 0 to 10⁸.
+    pub n: f64,
+}
+
+/// L = `ambient` + Σ over the lights seen (`diffuse`·max(0, n·s) + `specular`·max(0, r·b)^`alpha`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EquationSpec {
+    /// r_a I_a, radiance, at least 0.
+    pub ambient: [f64; 3],
+    /// r_d I_d, radiance, at least 0.
+    pub diffuse: [f64; 3],
+    /// r_s I_s, radiance, at least 0.
+    pub specular: [f64; 3],
+    /// α, at least 0.
+    pub alpha: f64,
+}
+
+/// A sphere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SphereSpec {
+    /// Centre, m.
+    pub center: [f64; 3],
+    /// Radius, m, above 0.
+    pub radius: f64,
+    /// Name of its material.
+    pub material: String,
+}
+
+/// An infinite plane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlaneSpec {
+    /// A point on it, m.
+    pub point: [f64; 3],
+    /// Its normal, of any length but 0.
+    pub normal: [f64; 3],
+    /// Name of its material.
+    pub material: String,
+}
+
+/// The parallelogram of the points centre + a·u + b·v, a and b in [−1, 1].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QuadSpec {
+    /// Centre, m.
+    pub center: [f64; 3],
+    /// First half-edge, m.
+    pub u: [f64; 3],
+    /// Second half-edge, m; not parallel to the first.
+    pub v: [f64; 3],
+    /// Name of its material.
+    pub material: String,
+}
+
+/// A triangle mesh in an OBJ file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSpec {
+    /// The file, relative to the scene file.
+    pub file: PathBuf,
+    /// Name of its material.
+    pub material: String,
+    /// Which normals shade it.
+    #[serde(default)]
+    pub normals: MeshNormals,
+}
+
+/// Which normals shade a mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MeshNormals {
+    /// Each face is flat.
+    #[default]
+    Face,
+    /// The file's vertex normals, interpolated.
+    Vertex,
+}
+
+/// All lights of a scene. A light shines on the side of its normal and is seen by the camera if it has a surface.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LightsSpec {
+    /// Point lights.
+    pub point: Vec<PointLightSpec>,
+    /// Lights at infinity.
+    pub directional: Vec<DirectionalLightSpec>,
+    /// Shining parallelograms.
+    pub quad: Vec<QuadLightSpec>,
+    /// Light from everywhere.
+    pub environment: Option<EnvironmentSpec>,
+}
+
+/// A point that shines alike in all directions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointLightSpec {
+    /// Where, m.
+    pub position: [f64; 3],
+    /// Radiant intensity, W/sr, at least 0.
+    pub intensity: [f64; 3],
+}
+
+/// Parallel light.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DirectionalLightSpec {
+    /// Direction towards the light, of any length but 0.
+    pub toward: [f64; 3],
+    /// Irradiance on a surface that faces it, W/m², at least 0.
+    pub irradiance: [f64; 3],
+}
+
+/// A parallelogram as in [`QuadSpec`] whose front shines alike in all directions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QuadLightSpec {
+    /// Centre, m.
+    pub center: [f64; 3],
+    /// First half-edge, m.
+    pub u: [f64; 3],
+    /// Second half-edge, m; not parallel to the first.
+    pub v: [f64; 3],
+    /// Radiance, W/(sr·m²), at least 0.
+    pub radiance: [f64; 3],
+}
+
+/// Light of one radiance from all directions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnvironmentSpec {
+    /// Radiance, W/(sr·m²), at least 0.
+    pub radiance: [f64; 3],
+}
+
+impl SceneSpec {
+    /// Reads and validates a scene file.
+    ///
+    /// # Errors
+    /// [`RenderError`] naming the file and the line or field.
+    pub fn read(path: &Path) -> Result<Self, RenderError> {
+        let text = std::fs::read_to_string(path).map_err(|source| RenderError::Io { path: path.into(), source })?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Parses and validates the text of a scene file; `origin` names it in errors.
+    ///
+    /// # Errors
+    /// [`RenderError::Toml`] with line and column, or [`RenderError::Field`] with field, value and constraint.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, RenderError> {
+        let spec: Self = toml::from_str(text).map_err(|error| toml_error(text, origin, &error))?;
+        spec.validate(origin)?;
+        Ok(spec)
+    }
+
+    /// The names of the materials that are files, with those files as typed: the caller resolves them before building.
+    pub fn material_files(&self) -> impl Iterator<Item = (&str, &Path)> {
+        self.materials.iter().filter_map(|(name, spec)| Some((name.as_str(), spec.file.as_deref()?)))
+    }
+}
+
+fn toml_error(text: &str, origin: &str, error: &toml::de::Error) -> RenderError {
+    let at = error.span().map_or(0, |span| span.start);
+    let before = text.get(..at).unwrap_or(text);
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().map_or(0, |tail| tail.chars().count()) + 1;
+    RenderError::Toml { origin: origin.into(), line, column, message: error.message().trim().replace('\n', " ") }
+}

@@ -1,0 +1,156 @@
+//! The ranges of a scene's fields: each is checked once, and an error names field, value and constraint.
+
+use glam::DVec3;
+
+use super::super::RenderError;
+use super::spec::{MaterialSpec, SceneSpec};
+
+/// Names the place of one value for the checks below.
+struct Check<'a> {
+    origin: &'a str,
+}
+
+impl Check<'_> {
+    fn fail(&self, field: &str, value: impl std::fmt::Debug, constraint: &str) -> RenderError {
+        RenderError::Field {
+            origin: self.origin.into(),
+            field: field.into(),
+            value: format!("{value:?}"),
+            constraint: constraint.into(),
+        }
+    }
+
+    fn holds(&self, ok: bool, field: &str, value: impl std::fmt::Debug, constraint: &str) -> Result<(), RenderError> {
+        if ok { Ok(()) } else { Err(self.fail(field, value, constraint)) }
+    }
+
+    fn finite(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
+        self.holds(v.iter().all(|x| x.is_finite()), field, v, "three finite numbers")
+    }
+
+    fn direction(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
+        self.finite(field, v)?;
+        self.holds(DVec3::from(v).try_normalize().is_some(), field, v, "a direction, so not 0 0 0")
+    }
+
+    fn color(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
+        self.holds(v.iter().all(|x| x.is_finite() && *x >= 0.0), field, v, "three finite numbers of at least 0")
+    }
+
+    fn half_edges(&self, place: &str, u: [f64; 3], v: [f64; 3]) -> Result<(), RenderError> {
+        self.direction(&format!("{place}.u"), u)?;
+        self.direction(&format!("{place}.v"), v)?;
+        let (a, b) = (DVec3::from(u).normalize(), DVec3::from(v).normalize());
+        let spans = a.cross(b).length() > 1e-12;
+        self.holds(spans, &format!("{place}.v"), v, "a direction other than that of `u`")
+    }
+}
+
+impl SceneSpec {
+    /// Checks every field; `origin` names the scene in errors.
+    ///
+    /// # Errors
+    /// [`RenderError::Field`] for the first field that is out of range.
+    pub fn validate(&self, origin: &str) -> Result<(), RenderError> {
+        let check = Check { origin };
+        check.holds(self.version == 1, "version", self.version, "1, the only version there is")?;
+        check.holds(self.max_bounces <= 1000, "max_bounces", self.max_bounces, "at most 1000")?;
+        self.validate_camera(&check)?;
+        for (name, material) in &self.materials {
+            validate_material(&check, &format!("materials.{name}"), material)?;
+        }
+        self.validate_shapes(&check)?;
+        self.validate_lights(&check)?;
+        self.validate_names(&check)
+    }
+
+    fn validate_camera(&self, check: &Check<'_>) -> Result<(), RenderError> {
+        let camera = &self.camera;
+        check.finite("camera.position", camera.position)?;
+        check.finite("camera.target", camera.target)?;
+        check.direction("camera.up", camera.up)?;
+        let fov = camera.fov_deg;
+        check.holds(fov > 0.0 && fov < 180.0, "camera.fov_deg", fov, "above 0 and below 180")?;
+        let forward = (DVec3::from(camera.target) - DVec3::from(camera.position)).try_normalize();
+        let forward = forward
+            .ok_or_else(|| check.fail("camera.target", camera.target, "a point other than `camera.position`"))?;
+        let upright = forward.cross(DVec3::from(camera.up).normalize()).length() > 1e-9;
+        check.holds(upright, "camera.up", camera.up, "a direction that is not parallel to the line of sight")?;
+        let size = self.film.resolution;
+        let fits = size.iter().all(|n| (1..=16384).contains(n));
+        check.holds(fits, "film.resolution", size, "two numbers of pixels from 1 to 16384")?;
+        let samples = self.film.samples;
+        check.holds((1..=1 << 24).contains(&samples), "film.samples", samples, "from 1 to 16777216")
+    }
+
+    fn validate_shapes(&self, check: &Check<'_>) -> Result<(), RenderError> {
+        for (i, s) in self.spheres.iter().enumerate() {
+            check.finite(&format!("sphere[{i}].center"), s.center)?;
+            let fits = s.radius.is_finite() && s.radius > 0.0;
+            check.holds(fits, &format!("sphere[{i}].radius"), s.radius, "a finite number above 0")?;
+        }
+        for (i, p) in self.planes.iter().enumerate() {
+            check.finite(&format!("plane[{i}].point"), p.point)?;
+            check.direction(&format!("plane[{i}].normal"), p.normal)?;
+        }
+        for (i, q) in self.quads.iter().enumerate() {
+            check.finite(&format!("quad[{i}].center"), q.center)?;
+            check.half_edges(&format!("quad[{i}]"), q.u, q.v)?;
+        }
+        Ok(())
+    }
+
+    fn validate_lights(&self, check: &Check<'_>) -> Result<(), RenderError> {
+        for (i, l) in self.lights.point.iter().enumerate() {
+            check.finite(&format!("light.point[{i}].position"), l.position)?;
+            check.color(&format!("light.point[{i}].intensity"), l.intensity)?;
+        }
+        for (i, l) in self.lights.directional.iter().enumerate() {
+            check.direction(&format!("light.directional[{i}].toward"), l.toward)?;
+            check.color(&format!("light.directional[{i}].irradiance"), l.irradiance)?;
+        }
+        for (i, l) in self.lights.quad.iter().enumerate() {
+            check.finite(&format!("light.quad[{i}].center"), l.center)?;
+            check.half_edges(&format!("light.quad[{i}]"), l.u, l.v)?;
+            check.color(&format!("light.quad[{i}].radiance"), l.radiance)?;
+        }
+        self.lights.environment.iter().try_for_each(|e| check.color("light.environment.radiance", e.radiance))
+    }
+
+    /// Every material that is named is described.
+    fn validate_names(&self, check: &Check<'_>) -> Result<(), RenderError> {
+        let spheres = self.spheres.iter().enumerate().map(|(i, s)| (format!("sphere[{i}].material"), &s.material));
+        let planes = self.planes.iter().enumerate().map(|(i, p)| (format!("plane[{i}].material"), &p.material));
+        let quads = self.quads.iter().enumerate().map(|(i, q)| (format!("quad[{i}].material"), &q.material));
+        let meshes = self.meshes.iter().enumerate().map(|(i, m)| (format!("mesh[{i}].material"), &m.material));
+        let subject = self.subject.iter().map(|name| ("subject".to_owned(), name));
+        for (field, name) in spheres.chain(planes).chain(quads).chain(meshes).chain(subject) {
+            let known = self.materials.keys().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
+            let constraint = format!("the name of a material of this scene: {known}");
+            check.holds(self.materials.contains_key(name), &field, name, &constraint)?;
+        }
+        Ok(())
+    }
+}
+
+fn validate_material(check: &Check<'_>, place: &str, material: &MaterialSpec) -> Result<(), RenderError> {
+    let lobes = material.kd.is_some() || !material.phong.is_empty();
+    let kinds = [lobes, material.file.is_some(), material.equation.is_some(), material.black];
+    let one = kinds.iter().filter(|given| **given).count();
+    let constraint = "exactly one of lobes (`kd`, `phong`), `file`, `equation`, `black = true`";
+    check.holds(one == 1, place, format_args!("{one} kinds of material"), constraint)?;
+    material.kd.iter().try_for_each(|kd| check.color(&format!("{place}.kd"), *kd))?;
+    for (i, lobe) in material.phong.iter().enumerate() {
+        check.color(&format!("{place}.phong[{i}].ks"), lobe.ks)?;
+        let fits = (0.0..=1e8).contains(&lobe.n);
+        check.holds(fits, &format!("{place}.phong[{i}].n"), lobe.n, "from 0 to 1e8")?;
+    }
+    if let Some(equation) = &material.equation {
+        check.color(&format!("{place}.equation.ambient"), equation.ambient)?;
+        check.color(&format!("{place}.equation.diffuse"), equation.diffuse)?;
+        check.color(&format!("{place}.equation.specular"), equation.specular)?;
+        let fits = equation.alpha.is_finite() && equation.alpha >= 0.0;
+        check.holds(fits, &format!("{place}.equation.alpha"), equation.alpha, "a finite number of at least 0")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,159 @@
+//! All shapes of a scene, and the questions a path asks them: what is met first, and is anything in between.
+
+use glam::DVec3;
+
+use super::super::bvh::Bvh;
+use super::super::ray::{Ray, SurfacePoint};
+use super::triangle::{self, ShearedRay};
+use super::{Mesh, Plane, Quad, Sphere};
+
+/// To whom a piece of surface belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Owner {
+    /// Index of a material.
+    Material(usize),
+    /// Index of a light; its front shines, and it reflects nothing.
+    Light(usize),
+}
+
+/// Where a ray met a surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Surface {
+    /// The point and the geometric normal.
+    pub point: SurfacePoint,
+    /// Unit normal that shades: the geometric one, or interpolated over a mesh.
+    pub shading_normal: DVec3,
+    /// Whose surface it is.
+    pub owner: Owner,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Hit {
+    Sphere(usize),
+    Plane(usize),
+    Quad(usize, f64, f64),
+    Triangle(usize, f64, f64),
+}
+
+/// All shapes of a scene.
+#[derive(Debug, Default)]
+pub struct Geometry {
+    spheres: Vec<(Sphere, Owner)>,
+    planes: Vec<(Plane, Owner)>,
+    quads: Vec<(Quad, Owner)>,
+    triangles: Option<Triangles>,
+}
+
+#[derive(Debug)]
+struct Triangles {
+    bvh: Bvh,
+    corners: Vec<[DVec3; 3]>,
+    normals: Vec<Option<[DVec3; 3]>>,
+    owners: Vec<Owner>,
+}
+
+impl Geometry {
+    /// The shapes of a scene.
+    pub fn new(
+        spheres: Vec<(Sphere, Owner)>,
+        planes: Vec<(Plane, Owner)>,
+        quads: Vec<(Quad, Owner)>,
+        meshes: Vec<(Mesh, Owner)>,
+    ) -> Self {
+        Self { spheres, planes, quads, triangles: Triangles::new(meshes) }
+    }
+
+    /// The surface that the ray meets first.
+    pub fn closest(&self, ray: &Ray) -> Option<Surface> {
+        let (mut t_max, mut best) = (ray.t_max, None);
+        for (i, (sphere, _)) in self.spheres.iter().enumerate() {
+            if let Some(t) = sphere.hit(ray, t_max) {
+                (t_max, best) = (t, Some(Hit::Sphere(i)));
+            }
+        }
+        for (i, (plane, _)) in self.planes.iter().enumerate() {
+            if let Some(t) = plane.hit(ray, t_max) {
+                (t_max, best) = (t, Some(Hit::Plane(i)));
+            }
+        }
+        for (i, (quad, _)) in self.quads.iter().enumerate() {
+            if let Some((t, a, b)) = quad.hit(ray, t_max) {
+                (t_max, best) = (t, Some(Hit::Quad(i, a, b)));
+            }
+        }
+        if let Some((t, hit)) = self.triangles.as_ref().and_then(|mesh| mesh.closest(&Ray { t_max, ..*ray })) {
+            (t_max, best) = (t, Some(hit));
+        }
+        best.map(|hit| self.surface(hit, ray.at(t_max)))
+    }
+
+    /// Whether anything, seen from either side, lies on the ray.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        let t_max = ray.t_max;
+        self.spheres.iter().any(|(sphere, _)| sphere.hit(ray, t_max).is_some())
+            || self.quads.iter().any(|(quad, _)| quad.hit(ray, t_max).is_some())
+            || self.planes.iter().any(|(plane, _)| plane.hit(ray, t_max).is_some())
+            || self.triangles.as_ref().is_some_and(|mesh| mesh.occluded(ray))
+    }
+
+    fn surface(&self, hit: Hit, p: DVec3) -> Surface {
+        let (point, owner) = match hit {
+            Hit::Sphere(i) => (self.spheres[i].0.surface(p), self.spheres[i].1),
+            Hit::Plane(i) => (self.planes[i].0.surface(p), self.planes[i].1),
+            Hit::Quad(i, a, b) => (self.quads[i].0.surface(a, b), self.quads[i].1),
+            Hit::Triangle(i, b1, b2) => return self.triangle_surface(i, b1, b2),
+        };
+        Surface { point, shading_normal: point.normal, owner }
+    }
+
+    fn triangle_surface(&self, i: usize, b1: f64, b2: f64) -> Surface {
+        debug_assert!(self.triangles.is_some());
+        let (corners, normals, owner) = self.triangles.as_ref().map_or(
+            ([DVec3::ZERO; 3], None, Owner::Material(0)), // never: the index came from these triangles
+            |mesh| (mesh.corners[i], mesh.normals[i], mesh.owners[i]),
+        );
+        let point = triangle::surface(&corners, b1, b2);
+        let smooth = normals.and_then(|[n0, n1, n2]| ((1.0 - b1 - b2) * n0 + b1 * n1 + b2 * n2).try_normalize());
+        Surface { point, shading_normal: smooth.unwrap_or(point.normal), owner }
+    }
+}
+
+impl Triangles {
+    fn new(meshes: Vec<(Mesh, Owner)>) -> Option<Self> {
+        let (mut corners, mut normals, mut owners) = (Vec::new(), Vec::new(), Vec::new());
+        for (mesh, owner) in meshes {
+            normals.extend((0..mesh.triangles.len()).map(|i| mesh.normals.get(i).copied()));
+            owners.extend(std::iter::repeat_n(owner, mesh.triangles.len()));
+            corners.extend(mesh.triangles);
+        }
+        if corners.is_empty() {
+            return None;
+        }
+        let boxes: Vec<_> =
+            corners.iter().map(|[a, b, c]: &[DVec3; 3]| (a.min(*b).min(*c), a.max(*b).max(*c))).collect();
+        let (bvh, order) = Bvh::new(&boxes);
+        let sorted = |i: &u32| *i as usize;
+        Some(Self {
+            bvh,
+            corners: order.iter().map(|i| corners[sorted(i)]).collect(),
+            normals: order.iter().map(|i| normals[sorted(i)]).collect(),
+            owners: order.iter().map(|i| owners[sorted(i)]).collect(),
+        })
+    }
+
+    fn closest(&self, ray: &Ray) -> Option<(f64, Hit)> {
+        let sheared = ShearedRay::new(ray);
+        let mut found = None;
+        self.bvh.traverse(ray, false, |i, t_max| {
+            let (t, b1, b2) = sheared.hit(&self.corners[i], t_max)?;
+            found = Some((t, Hit::Triangle(i, b1, b2)));
+            Some(t)
+        });
+        found
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        let sheared = ShearedRay::new(ray);
+        self.bvh.traverse(ray, true, |i, t_max| Some(sheared.hit(&self.corners[i], t_max)?.0)).is_some()
+    }
+}
