@@ -33,7 +33,21 @@ pub trait Lobe: Send + Sync + std::fmt::Debug {
     /// The lobe of weight 1 at a coordinate (1/sr, or 1/rad in the flat world); its derivatives by each shape parameter go
     /// into `gradient`, whose length is that of [`Lobe::parameters`].
     fn value(&self, shape: &[f64], coordinate: f64, gradient: &mut [f64]) -> f64;
+
+    /// [`Lobe::value`] of many coordinates at once: values and, parameter by parameter, derivatives; all of the coordinates'
+    /// length. What a fit calls: one call a block, however many samples.
+    fn fill(&self, shape: &[f64], coordinates: &[f64], values: &mut [f64], derivatives: &mut [Vec<f64>]) {
+        let mut gradient = [0.0; MAX_PARAMETERS];
+        let gradient = &mut gradient[..self.parameters().len()];
+        for (i, (value, &x)) in values.iter_mut().zip(coordinates).enumerate() {
+            *value = self.value(shape, x, gradient);
+            derivatives.iter_mut().zip(gradient.iter()).for_each(|(list, g)| list[i] = *g);
+        }
+    }
 }
+
+/// Most shape parameters that a lobe may have.
+pub const MAX_PARAMETERS: usize = 4;
 
 /// The lobes that goniofit knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

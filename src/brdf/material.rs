@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::lobe::{Lobe, LobeKind, ln_cos_alpha};
+use super::lobe::{Lobe, LobeKind, MAX_PARAMETERS, ln_cos_alpha};
 use super::{Brdf, Sample, phong};
 use crate::brdf::file::FitRecord;
 use crate::geometry::sampling::{cosine_hemisphere, cosine_hemisphere_pdf, cosine_power};
@@ -96,7 +96,7 @@ impl Material {
         for term in &self.lobes {
             let lobe = term.kind.lobe();
             let coordinate = lobe.coordinate(wi, wo);
-            let mut gradient = [0.0; 4];
+            let mut gradient = [0.0; MAX_PARAMETERS];
             let gradient = &mut gradient[..lobe.parameters().len()];
             for (c, value) in out.iter_mut().enumerate() {
                 if let Some(shape) = term.shape_of(c) {

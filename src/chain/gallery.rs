@@ -106,5 +106,9 @@ fn legend(reference: &Image) -> Tile {
         ..reference.clone()
     };
     let exposure = exposure_for(&noise);
-    tile(develop(&noise, exposure), "standard error of the pixels", format!("white is {:.1e} W/(sr m²)", (-exposure).exp2()))
+    tile(
+        develop(&noise, exposure),
+        "standard error of the pixels",
+        format!("white is {:.1e} W/(sr m²)", (-exposure).exp2()),
+    )
 }

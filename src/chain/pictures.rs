@@ -52,7 +52,9 @@ pub fn picture(
     if let Some(subject) = subject {
         let Some(slot) = &stage.spec.subject else {
             let name = &stage.spec.name;
-            return Err(ChainError::Mismatch(format!("scene {name} has no `subject`: no material in it can be replaced")));
+            return Err(ChainError::Mismatch(format!(
+                "scene {name} has no `subject`: no material in it can be replaced"
+            )));
         };
         materials.insert(slot.clone(), subject);
     }

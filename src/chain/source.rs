@@ -119,11 +119,7 @@ pub fn shown_channels(name: &str, channels: &[String], rgb: Option<&[String; 3]>
 ///
 /// # Errors
 /// [`ChainError`] where it can't be rendered, with the reason.
-pub fn render_material(
-    name: &str,
-    source: &Source,
-    rgb: Option<&[String; 3]>,
-) -> Result<render::Material, ChainError> {
+pub fn render_material(name: &str, source: &Source, rgb: Option<&[String; 3]>) -> Result<render::Material, ChainError> {
     let channels = shown_channels(name, source.channels(), rgb)?;
     let brdf: Arc<dyn Brdf> = match source {
         Source::Fitted(material) => match material.reflectance(&channels) {

@@ -11,10 +11,12 @@ use super::simulate::parse_scan;
 use super::ui::Ui;
 use crate::chain::{self, Source};
 use crate::gonio::Scan;
-use crate::measurement::{Format, MerlGrid, Directions};
+use crate::measurement::{Directions, Format, MerlGrid};
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  goniofit convert gold.binary gold.csv\n  goniofit convert gold.json gold-fit.binary")]
+#[command(
+    after_help = "Examples:\n  goniofit convert gold.binary gold.csv\n  goniofit convert gold.json gold-fit.binary"
+)]
 pub(super) struct Args {
     /// A measurement, or a fitted material (.json); `-` is stdin
     input: String,

@@ -55,7 +55,9 @@ fn describe(demo: &Demo) -> String {
         }
         for (i, parameter) in lobe.kind.lobe().parameters().iter().enumerate() {
             let truth = lobe.shape_of(0).and_then(|s| s.get(i).copied()).unwrap_or(f64::NAN);
-            row(&mut t, &format!("{}.{}", lobe.kind.name(), parameter.name), truth, &demo.fits, |fit| shape_of(fit, l, i));
+            row(&mut t, &format!("{}.{}", lobe.kind.name(), parameter.name), truth, &demo.fits, |fit| {
+                shape_of(fit, l, i)
+            });
         }
     }
     t.push('\n');

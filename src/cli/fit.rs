@@ -90,7 +90,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         None => Ok(()),
         Some(first) => Err(Failure {
             code: failures.iter().map(|f| f.code).min().unwrap_or(1),
-            message: format!("{} of {} files could not be fitted; the first: {}", failures.len(), args.files.len(), first.message),
+            message: format!(
+                "{} of {} files could not be fitted; the first: {}",
+                failures.len(),
+                args.files.len(),
+                first.message
+            ),
         }),
     }
 }
@@ -174,7 +179,12 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
     for (l, lobe) in material.lobes.iter().enumerate() {
         for (c, weight) in lobe.weight.iter().enumerate() {
             let error = record.standard_error.get(l).and_then(|r| r.weight.get(c).copied().flatten());
-            let _ = writeln!(t, "  {:22} {}", format!("{}.weight[{}]", lobe.kind.name(), material.channels[c]), plus_minus(*weight, error));
+            let _ = writeln!(
+                t,
+                "  {:22} {}",
+                format!("{}.weight[{}]", lobe.kind.name(), material.channels[c]),
+                plus_minus(*weight, error)
+            );
         }
         let Some(shape) = &lobe.shape else {
             let _ = writeln!(t, "  {:22} undetermined: the lobe has no weight", format!("{}.*", lobe.kind.name()));
@@ -186,7 +196,8 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
                 _ => None,
             };
             let value = shape.get(i).and_then(|v| v.get(0)).unwrap_or(f64::NAN);
-            let _ = writeln!(t, "  {:22} {}", format!("{}.{}", lobe.kind.name(), parameter.name), plus_minus(value, error));
+            let _ =
+                writeln!(t, "  {:22} {}", format!("{}.{}", lobe.kind.name(), parameter.name), plus_minus(value, error));
         }
     }
     for warning in &record.warnings {

@@ -80,7 +80,8 @@ fn describe(s: &Summary, scatter: &Result<Vec<Scatter>, String>) -> String {
     let _ = writeln!(t, "  valid values  {} ({:.1} %)", s.valid, 100.0 * s.valid_share);
     if s.masked.total() > 0 {
         let first = s.masked.first_not_finite.as_ref().map_or(String::new(), |p| format!(", the first at {p}"));
-        let _ = writeln!(t, "  masked        {} not measured, {} not finite{first}", s.masked.marked, s.masked.not_finite);
+        let _ =
+            writeln!(t, "  masked        {} not measured, {} not finite{first}", s.masked.marked, s.masked.not_finite);
     }
     let range = |r: Option<(f64, f64)>| r.map_or("none".into(), |(a, b)| format!("{a:.2}° to {b:.2}°"));
     let _ = writeln!(t, "  θi            {}", range(s.theta_i_deg));

@@ -112,7 +112,8 @@ impl Progress for Bar {
     fn start(&self, label: &str, total: u64) {
         self.with(|current| {
             let bar = ProgressBar::new(total).with_message(label.to_owned());
-            if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:30} {percent:>3} %  {elapsed} of {duration}") {
+            if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:30} {percent:>3} %  {elapsed} of {duration}")
+            {
                 bar.set_style(style);
             }
             bar.enable_steady_tick(Duration::from_millis(200));

@@ -44,7 +44,8 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::output(&args.out, &e))?;
     let options = args.picture.options(&stage);
     let studio = Studio { stage: &stage, options, rgb: args.picture.rgb.as_ref(), control: ui.control() };
-    let reference = studio.shown(0, "table", &args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)))?;
+    let reference =
+        studio.shown(0, "table", &args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)))?;
     let mut others = Vec::new();
     for (k, (file, material)) in fits.iter().enumerate() {
         let label = format!("fit: {}", material.model());
@@ -70,7 +71,8 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         let differs = c.significance.as_ref().map_or("–", |s| if s.differs { "yes" } else { "no" });
         let psnr = c.psnr.map_or("–".into(), |p| format!("{p:.1}"));
         let label = format!("{file} ({})", m.model());
-        let _ = writeln!(text, "  {label:28} {:>10.3e} {:>10.3e} {psnr:>8} {:>8}  {differs}", c.rmse, c.rel_mse, c.masked);
+        let _ =
+            writeln!(text, "  {label:28} {:>10.3e} {:>10.3e} {psnr:>8} {:>8}  {differs}", c.rmse, c.rel_mse, c.masked);
     }
     let _ = writeln!(text, "  written to {}", args.out.display());
     ui.result(&text, &object);

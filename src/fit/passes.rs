@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::samples::Samples;
 use crate::brdf::LobeKind;
-use crate::numeric::sum::{BLOCK, fold_blocks};
+use crate::numeric::sum::fold_blocks;
 
 /// A lobe of the model at given shapes (natural units).
 #[derive(Debug, Clone)]
@@ -23,21 +23,28 @@ struct Columns {
 fn columns(samples: &Samples, lobes: &[ShapedLobe], block: std::ops::Range<usize>) -> Columns {
     let mut out = Columns { phi: Vec::new(), slope: Vec::new() };
     for lobe in lobes {
-        let kind = lobe.kind.lobe();
-        let coordinate = &samples.coordinate(lobe.kind)[block.clone()];
-        let mut gradient = vec![0.0; lobe.shape.len()];
-        let mut slopes = vec![Vec::with_capacity(BLOCK); lobe.shape.len()];
-        let phi = coordinate.iter().map(|&x| {
-            let value = kind.value(&lobe.shape, x, &mut gradient);
-            for (list, (g, s)) in slopes.iter_mut().zip(gradient.iter().zip(&lobe.shape)) {
-                list.push(g * s);
-            }
-            value
-        });
-        out.phi.push(phi.collect());
+        let (phi, slopes) = basis(samples, lobe.kind, &lobe.shape, block.clone());
+        out.phi.push(phi);
         out.slope.extend(slopes);
     }
     out
+}
+
+/// Values of one lobe over a block, and its derivatives by t = ln(shape).
+pub(super) fn basis(
+    samples: &Samples,
+    kind: LobeKind,
+    shape: &[f64],
+    block: std::ops::Range<usize>,
+) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let coordinate = &samples.coordinate(kind)[block];
+    let mut phi = vec![0.0; coordinate.len()];
+    let mut slopes = vec![vec![0.0; coordinate.len()]; shape.len()];
+    kind.lobe().fill(shape, coordinate, &mut phi, &mut slopes);
+    for (list, s) in slopes.iter_mut().zip(shape) {
+        list.iter_mut().for_each(|d| *d *= s);
+    }
+    (phi, slopes)
 }
 
 /// Σ a·b with eight running sums: the compiler can use vector registers, and the bracketing is fixed.

@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::nnls;
-use super::passes::dot;
+use super::passes::{basis, dot};
 use super::samples::Samples;
 use super::varpro::Profile;
+use crate::brdf::LobeKind;
 use crate::numeric::sum::fold_blocks;
 
 /// Starts polished at most.
@@ -186,28 +187,18 @@ fn tabulate(problem: &Profile<'_>, pairs: bool) -> Lattice {
 
 fn lattice_columns(
     samples: &Samples,
-    plain: &[crate::brdf::LobeKind],
-    shaped: crate::brdf::LobeKind,
+    plain: &[LobeKind],
+    shaped: LobeKind,
     t: &[f64],
     slopes: bool,
     block: std::ops::Range<usize>,
 ) -> Vec<Vec<f64>> {
-    let value = |kind: crate::brdf::LobeKind, shape: &[f64]| {
-        let lobe = kind.lobe();
-        let mut gradient = vec![0.0; shape.len()];
-        samples.coordinate(kind)[block.clone()]
-            .iter()
-            .map(|&x| (lobe.value(shape, x, &mut gradient), gradient.first().copied().unwrap_or(0.0)))
-            .unzip::<f64, f64, Vec<f64>, Vec<f64>>()
-    };
-    let mut columns: Vec<Vec<f64>> = plain.iter().map(|kind| value(*kind, &[]).0).collect();
+    let mut columns: Vec<Vec<f64>> = plain.iter().map(|kind| basis(samples, *kind, &[], block.clone()).0).collect();
     let mut derivatives = Vec::new();
     for t in t {
-        let n = t.exp();
-        let (phi, mut slope) = value(shaped, &[n]);
+        let (phi, slope) = basis(samples, shaped, &[t.exp()], block.clone());
         columns.push(phi);
-        slope.iter_mut().for_each(|s| *s *= n);
-        derivatives.push(slope);
+        derivatives.extend(slope);
     }
     if slopes {
         columns.extend(derivatives);

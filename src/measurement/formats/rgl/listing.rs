@@ -44,7 +44,8 @@ pub(super) fn list(brdf: &RglBrdf, valid: Option<&[u8]>, values_name: &str) -> L
             validity.measured
         }
     };
-    let usable: Vec<bool> = measured.iter().zip(wi.iter().zip(&wo)).map(|(&m, (i, o))| m && i.z > 0.0 && o.z > 0.0).collect();
+    let usable: Vec<bool> =
+        measured.iter().zip(wi.iter().zip(&wo)).map(|(&m, (i, o))| m && i.z > 0.0 && o.z > 0.0).collect();
     let (values, masked) = values(brdf, &factors, &usable, values_name);
     Listing { wi, wo, values, weights, masked, notes }
 }
@@ -109,9 +110,7 @@ fn solid_angles(brdf: &RglBrdf, p: usize, t: usize) -> Vec<f64> {
 fn weights(brdf: &RglBrdf, slices: &[Slice]) -> Vec<f64> {
     let azimuth = match (brdf.symmetry, brdf.phi_i.as_slice()) {
         (Symmetry::Isotropic, _) | (_, [] | [_]) => vec![TAU / brdf.phi_i.len() as f64; brdf.phi_i.len()],
-        (_, nodes @ [first, .., last]) => {
-            cell_borders(nodes, *first, *last).windows(2).map(|b| b[1] - b[0]).collect()
-        }
+        (_, nodes @ [first, .., last]) => cell_borders(nodes, *first, *last).windows(2).map(|b| b[1] - b[0]).collect(),
     };
     let polar = polar_cells(&brdf.theta_i);
     let incidence = azimuth.iter().flat_map(|a| polar.iter().map(move |p| a * p));

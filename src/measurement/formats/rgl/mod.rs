@@ -32,7 +32,9 @@ pub const MAGIC: &[u8] = b"tensor_file\0";
 pub fn read(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Measurement, MeasurementError> {
     let file = TensorFile::parse(path, bytes)?;
     if options.quantity == Some(Quantity::Brdf) {
-        return Err(file.unsupported("an RGL tensor file holds BRDF·cosθo by definition; read it without --quantity brdf"));
+        return Err(
+            file.unsupported("an RGL tensor file holds BRDF·cosθo by definition; read it without --quantity brdf")
+        );
     }
     let (values_field, channels) = channels(&file)?;
     let brdf = brdf_of(&file, values_field, channels)?;

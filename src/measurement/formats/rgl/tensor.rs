@@ -120,7 +120,11 @@ impl<'a> TensorFile<'a> {
         if field.kind == kind {
             return Ok(());
         }
-        Err(self.invalid(format!("field `{}`", field.name), format!("type {}", kind.name), format!("type {}", field.kind.name)))
+        Err(self.invalid(
+            format!("field `{}`", field.name),
+            format!("type {}", kind.name),
+            format!("type {}", field.kind.name),
+        ))
     }
 
     /// An error about the shape of a field.
