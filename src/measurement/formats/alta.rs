@@ -152,7 +152,10 @@ impl Header {
             Some("INV_STERADIAN_COSINE_FACTOR") => (plain(), Quantity::BrdfCos),
             Some("INV_STERADIAN" | "UNKNOWN_OUTPUT") | None => (plain(), Quantity::Brdf),
             Some(other) => {
-                return Err(line.unsupported(&format!("the output parameterisation {other} is not known to be a BRDF")));
+                return Err(line.unsupported(&format!(
+                    "expected an output parameterisation that is a BRDF, found {}",
+                    quoted(other)
+                )));
             }
         };
         if channels.len() != ny {
@@ -176,7 +179,8 @@ fn param_in(line: Line<'_>, name: &str) -> Result<ParamIn, MeasurementError> {
     let known = ParamIn::ALL.iter().find(|(_, n, _)| *n == name).map(|(param, _, _)| *param);
     known.ok_or_else(|| {
         let names: Vec<&str> = ParamIn::ALL.iter().map(|(_, n, _)| *n).collect();
-        let reason = format!("the input parameterisation {} is not read; known are {}", quoted(name), names.join(", "));
+        let reason =
+            format!("expected an input parameterisation that is read ({}), found {}", names.join(", "), quoted(name));
         line.unsupported(&reason)
     })
 }

@@ -88,10 +88,16 @@ fn header(lines: &mut Lines<'_>) -> Result<f64, MeasurementError> {
     for word in words {
         match word.split_once('=') {
             Some(("angles", "deg") | ("bsdf", "value")) => {}
-            Some(("angles", _)) => return Err(line.unsupported("only angles=deg is read")),
-            Some(("bsdf", _)) => return Err(line.unsupported("only bsdf=value is read")),
+            Some(("angles", "sin")) => {
+                return Err(
+                    line.unsupported("expected angles=deg, found angles=sin, direction cosines, which are not read")
+                );
+            }
+            Some(("bsdf", "log")) => {
+                return Err(line.unsupported("expected bsdf=value, found bsdf=log, logarithms, which are not read"));
+            }
             Some(("scale", number)) => scale = line.finite("scale", number)?,
-            _ => return Err(line.invalid("", "angles=, bsdf= or scale=", quoted(word))),
+            _ => return Err(line.invalid("", "angles=deg, bsdf=value or scale=<number>", quoted(word))),
         }
     }
     Ok(scale)

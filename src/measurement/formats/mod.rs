@@ -88,7 +88,7 @@ impl Format {
         }
     }
 
-    /// Whether [`write`] writes it.
+    /// Whether [`write()`] writes it.
     #[must_use]
     pub fn is_written(self) -> bool {
         matches!(self, Self::Merl | Self::Csv)

@@ -126,14 +126,11 @@ impl Rows {
         let mut measurement = Measurement::new(name, directions, channels, concat(self.columns));
         measurement.masked = self.masked;
         measurement.notes.extend(self.horizon.first.map(|first| {
-            let (values, what) = (
-                self.horizon.values,
-                match self.quantity {
-                    Quantity::Brdf => "below the horizon",
-                    Quantity::BrdfCos => "at or below the horizon, where BRDF·cosθo gives no BRDF",
-                },
-            );
-            format!("{values} values {what}: masked; the first at {first}")
+            let what = match self.quantity {
+                Quantity::Brdf => "below the horizon",
+                Quantity::BrdfCos => "at or below the horizon, where BRDF·cosθo gives no BRDF",
+            };
+            format!("masked as {what}: {} of the values, the first at {first}", self.horizon.values)
         }));
         measurement
     }
@@ -171,7 +168,7 @@ mod tests {
         assert_eq!((table.masked.marked, table.masked.not_finite), (3, 1));
         assert_eq!(table.masked.first_not_finite.as_deref(), Some("θo 0"));
         assert_eq!(table.notes.len(), 1);
-        assert!(table.notes[0].starts_with("2 values at or below") && table.notes[0].ends_with("θo 90"));
+        assert!(table.notes[0].ends_with(": 2 of the values, the first at θo 90"), "{}", table.notes[0]);
     }
 
     #[test]

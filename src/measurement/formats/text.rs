@@ -151,6 +151,16 @@ impl Line<'_> {
         Err(self.invalid(column, "a finite number", quoted(text)))
     }
 
+    /// [`Self::numbers`] of a line that should hold `what`: where it holds words instead, the error says so.
+    pub(super) fn numbers_of(&self, what: &str) -> Result<Vec<f64>, MeasurementError> {
+        match self.text.split_whitespace().next() {
+            Some(word) if word.starts_with(|c: char| c.is_alphabetic()) && word.parse::<f64>().is_err() => {
+                Err(self.invalid("", what, quoted(self.text)))
+            }
+            _ => self.numbers(),
+        }
+    }
+
     /// All numbers of the line, separated by blanks (or commas): finite or not.
     pub(super) fn numbers(&self) -> Result<Vec<f64>, MeasurementError> {
         let cells = self.text.split(|c: char| c.is_whitespace() || c == ',').filter(|cell| !cell.is_empty());

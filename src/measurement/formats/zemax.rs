@@ -9,10 +9,10 @@
 //!
 //! `PlaneSymmetrical` lists A in [0°, 180°], which stands for both halves. A value 0 is a node that was not measured: it is masked.
 //!
-//! Measured on a file and its FRED twin (see [`super::fred`]; detector angles up to 80°): with this reading the zeros are those of the
-//! 912 nodes with θo > 80°, without exception. With A = 0° towards the horizon 318 nodes contradict that, with r as a difference of direction
+//! Measured on a file and its FRED twin (see [`super::fred`]; detector angles up to 80°): with this reading the 193 zeros are exactly
+//! those of the 912 nodes that have θo > 80°. With A = 0° towards the horizon 318 nodes contradict that, with r as a difference of direction
 //! cosines 118, with r and A as polar coordinates in the plane of angles 19. The stated TIS is not ∫ f cosθo dω of the values (off
-//! by +32, +27, +5, −24 % at 10°, 30°, 50°, 70°) but ½ ∫ f dω over the hemisphere round m (within 3 %): it is kept as
+//! by +32, +27, +5, −24 % at 10°, 30°, 50°, 70°) but ½ ∫ f dω over the hemisphere round m (within 0.3, 0.4, 1.1, 3.7 %): it is kept as
 //! stated, and a note tells where it is no albedo.
 
 use glam::DVec3;
@@ -170,7 +170,7 @@ impl Data {
             for &azimuth in &header.azimuth {
                 let what = format!("the {} values of incidence {incidence}°, azimuth {azimuth}°", header.radial.len());
                 let Some(line) = lines.next_content()? else { return Err(lines.ends_too_early(what)) };
-                let row = line.numbers()?;
+                let row = line.numbers_of(&what)?;
                 if row.len() != header.radial.len() {
                     return Err(line.invalid("", what, row.len().to_string()));
                 }
@@ -237,11 +237,10 @@ fn angles(lines: &mut Lines<'_>, key: &str, range: (f64, f64)) -> Result<Vec<f64
         .filter(|n| *n > 0)
         .ok_or_else(|| lines.invalid_at(number, key, "how many angles follow", quoted(&word)))?;
     let mut list: Vec<f64> = Vec::new();
+    let what = format!("{count} angles of {key}");
     while list.len() < count {
-        let Some(line) = lines.next_content()? else {
-            return Err(lines.ends_too_early(format!("{count} angles of {key}")));
-        };
-        list.extend(line.numbers()?);
+        let Some(line) = lines.next_content()? else { return Err(lines.ends_too_early(what)) };
+        list.extend(line.numbers_of(&what)?);
         check_angles(line, key, count, range, &list)?;
     }
     Ok(list)
@@ -261,7 +260,7 @@ fn check_angles(
         return Err(line.invalid(key, format!("angles from {} to {} degrees", range.0, range.1), angle.to_string()));
     }
     if let Some((i, angle)) = cells::not_ascending(list) {
-        return Err(line.invalid(key, "ascending angles", format!("{angle} as the {}th", i + 1)));
+        return Err(line.invalid(key, "ascending angles", format!("{angle} as number {}", i + 1)));
     }
     Ok(())
 }
