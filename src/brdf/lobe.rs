@@ -44,7 +44,28 @@ pub trait Lobe: Send + Sync + std::fmt::Debug {
             derivatives.iter_mut().zip(gradient.iter()).for_each(|(list, g)| list[i] = *g);
         }
     }
+
+    /// [`Lobe::fill`] for `count` shapes from `low` on, each twice the one before, to about 1e-10: enough to see where minima
+    /// lie. For lobes with one shape parameter.
+    fn fill_octaves(&self, low: f64, count: usize, coordinates: &[f64]) -> Octaves {
+        let fill = |k: usize| {
+            let mut values = vec![0.0; coordinates.len()];
+            let mut derivatives = vec![vec![0.0; coordinates.len()]];
+            self.fill(&[octave(low, k)], coordinates, &mut values, &mut derivatives);
+            (values, derivatives.swap_remove(0))
+        };
+        (0..count).map(fill).unzip()
+    }
 }
+
+/// `low` · 2^`k`.
+#[must_use]
+pub fn octave(low: f64, k: usize) -> f64 {
+    low * (k as f64).exp2()
+}
+
+/// Values and derivatives by the first shape parameter, one list a shape.
+pub type Octaves = (Vec<Vec<f64>>, Vec<Vec<f64>>);
 
 /// Most shape parameters that a lobe may have.
 pub const MAX_PARAMETERS: usize = 4;

@@ -16,7 +16,7 @@ pub mod spec;
 
 pub use classic::PhongEquation;
 pub use file::{FitRecord, LobeRecord, MaterialError};
-pub use lobe::{Lobe, LobeKind, Parameter};
+pub use lobe::{Lobe, LobeKind, Octaves, Parameter};
 pub use material::{LobeTerm, Material, PerChannel, Reflectance};
 pub use spec::{ModelSpec, SpecError};
 

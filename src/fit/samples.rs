@@ -59,7 +59,7 @@ impl Samples {
         let mut kinds: Vec<LobeKind> = model.lobes().to_vec();
         kinds.sort_unstable();
         kinds.dedup();
-        let coordinates = kinds.into_iter().map(|kind| (kind, coordinates(measurement, &index, kind))).collect();
+        let coordinates = coordinates(measurement, &index, &kinds);
         Ok(Self { index, slope, weight, data, counts, coordinates, solid_angle })
     }
 
@@ -157,13 +157,16 @@ fn channel_weights(measurement: &Measurement, index: &[u32], raw: &[f64]) -> (Ve
     (lists.into_iter().map(|l| l.0).collect(), counts)
 }
 
-fn coordinates(measurement: &Measurement, index: &[u32], kind: LobeKind) -> Vec<f64> {
-    let lobe = kind.lobe();
-    index
-        .par_iter()
-        .map(|&i| {
+/// Coordinates of every lobe kind; each pair of directions is found once.
+fn coordinates(measurement: &Measurement, index: &[u32], kinds: &[LobeKind]) -> Vec<(LobeKind, Vec<f64>)> {
+    let blocks = sum::map_blocks(index.len(), |block| {
+        let mut lists = vec![Vec::with_capacity(block.len()); kinds.len()];
+        for &i in &index[block] {
             let (wi, wo) = measurement.directions.pair(i as usize);
-            lobe.coordinate(wi, wo)
-        })
-        .collect()
+            lists.iter_mut().zip(kinds).for_each(|(list, kind)| list.push(kind.lobe().coordinate(wi, wo)));
+        }
+        lists
+    });
+    let join = |k: usize| blocks.iter().flat_map(|lists| lists[k].iter().copied()).collect();
+    kinds.iter().enumerate().map(|(k, kind)| (*kind, join(k))).collect()
 }

@@ -7,6 +7,7 @@ use super::passes::{basis, dot};
 use super::samples::Samples;
 use super::varpro::Profile;
 use crate::brdf::LobeKind;
+use crate::brdf::lobe::octave;
 use crate::numeric::sum::fold_blocks;
 
 /// Starts polished at most.
@@ -143,8 +144,8 @@ fn several(problem: &Profile<'_>, lobes: usize) -> Vec<Vec<f64>> {
 /// One pass over the samples for the whole lattice; `pairs` also sums products of different nodes.
 fn tabulate(problem: &Profile<'_>, pairs: bool) -> Lattice {
     let (low, high) = problem.layout[0].1.bounds;
-    let octaves = (high / low).log2().ceil() as usize;
-    let t: Vec<f64> = (0..=octaves).map(|k| (low.ln() + k as f64 * std::f64::consts::LN_2).min(high.ln())).collect();
+    let octaves = (high / low).log2().floor() as usize + 1;
+    let t: Vec<f64> = (0..octaves).map(|k| octave(low, k).ln()).collect();
     let plain: Vec<_> = problem.kinds.iter().filter(|k| k.lobe().parameters().is_empty()).copied().collect();
     let shaped = problem.kinds[problem.layout[0].0];
     let samples = problem.samples;
@@ -158,7 +159,7 @@ fn tabulate(problem: &Profile<'_>, pairs: bool) -> Lattice {
         samples.len(),
         zero.clone(),
         |block| {
-            let columns = lattice_columns(samples, &plain, shaped, &t, !pairs, block.clone());
+            let columns = lattice_columns(samples, &plain, (shaped, low, octaves), !pairs, block.clone());
             let (mut gram, mut data, mut energy) = zero.clone();
             let g = &samples.slope[block.clone()];
             for c in 0..samples.data.len() {
@@ -185,20 +186,20 @@ fn tabulate(problem: &Profile<'_>, pairs: bool) -> Lattice {
     Lattice { t, base: plain.len(), gram, data, energy }
 }
 
+/// Columns of one block: the lobes without a shape, the nodes of `shaped` (lobe, first shape, octaves), their slopes.
 fn lattice_columns(
     samples: &Samples,
     plain: &[LobeKind],
-    shaped: LobeKind,
-    t: &[f64],
+    shaped: (LobeKind, f64, usize),
     slopes: bool,
     block: std::ops::Range<usize>,
 ) -> Vec<Vec<f64>> {
+    let (kind, low, octaves) = shaped;
     let mut columns: Vec<Vec<f64>> = plain.iter().map(|kind| basis(samples, *kind, &[], block.clone()).0).collect();
-    let mut derivatives = Vec::new();
-    for t in t {
-        let (phi, slope) = basis(samples, shaped, &[t.exp()], block.clone());
-        columns.push(phi);
-        derivatives.extend(slope);
+    let (values, mut derivatives) = kind.lobe().fill_octaves(low, octaves, &samples.coordinate(kind)[block]);
+    columns.extend(values);
+    for (k, list) in derivatives.iter_mut().enumerate() {
+        list.iter_mut().for_each(|d| *d *= octave(low, k));
     }
     if slopes {
         columns.extend(derivatives);
