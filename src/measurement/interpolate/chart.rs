@@ -55,6 +55,13 @@ pub(super) struct Polar {
     pub(super) sin_phi: f64,
 }
 
+impl Polar {
+    /// On the near (1) or the far (−1) side of the plane of incidence.
+    pub(super) fn on_side(self, side: f64) -> Self {
+        Self { sin_phi: side * self.sin_phi, ..self }
+    }
+}
+
 impl Chart {
     pub(super) const BOTH: [Self; 2] = [Self::Half, Self::Retro];
 

@@ -72,12 +72,12 @@ impl TableBrdf {
             match &measurement.directions {
                 Directions::Merl(grid) => {
                     let table = MerlTable::new(measurement, *grid, channels);
-                    let sampler = Sampler::new(channels.len(), |wi, wo, out| table.eval(wi, wo, out));
+                    let sampler = Sampler::new(channels.len(), &[], |wi, wo, out| table.eval(wi, wo, out));
                     Table::Merl(table, sampler)
                 }
                 Directions::List { wi, wo } => {
                     let table = Scattered::new(measurement, wi, wo, channels, &mut notes)?;
-                    let sampler = Sampler::new(channels.len(), |wi, wo, out| table.eval(wi, wo, out));
+                    let sampler = Sampler::new(channels.len(), &table.breaks(), |wi, wo, out| table.eval(wi, wo, out));
                     Table::Scattered(table, sampler)
                 }
             }

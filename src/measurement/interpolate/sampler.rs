@@ -19,7 +19,7 @@ use crate::geometry::{direction, theta_of};
 /// Nodes in θo, evenly spaced from 0 to [`LAST_NODE`].
 const NODES: usize = 46;
 /// θo of the last node (rad): at 90° itself nothing is above the horizon.
-const LAST_NODE: f64 = 89.5 / 90.0 * FRAC_PI_2;
+const LAST_NODE: f64 = 89.7 / 90.0 * FRAC_PI_2;
 /// Rows of a chart in polar angle, spaced by squares: one to a bin of a MERL table's θh.
 const ROWS: usize = 90;
 /// Columns over half a turn of azimuth; the density is the same on both sides of the plane of incidence.
@@ -30,6 +30,8 @@ const COSINE_SHARE: f64 = 0.05;
 /// The tabulated densities.
 pub(super) struct Sampler {
     nodes: Vec<Node>,
+    /// θo of each node (rad), ascending.
+    angles: Vec<f64>,
     /// sin²(θ/2) at the borders of each chart's rows.
     borders: [Vec<f64>; 2],
 }
@@ -53,23 +55,25 @@ impl<F: Fn(DVec3, DVec3, &mut [f64]) -> bool + Sync> Evaluate for F {}
 
 impl Sampler {
     /// Tabulates the mean of `channels` channels of `eval`. The result does not depend on the number of threads.
-    pub(super) fn new(channels: usize, eval: impl Evaluate) -> Self {
+    /// `breaks` are angles θo (rad) at which the table changes abruptly: nodes of their own.
+    pub(super) fn new(channels: usize, breaks: &[f64], eval: impl Evaluate) -> Self {
+        let angles = node_angles(breaks);
         let borders = Chart::BOTH.map(row_borders);
-        let nodes = (0..NODES)
-            .into_par_iter()
-            .map(|k| {
-                let plane = Plane::new(direction(LAST_NODE * k as f64 / (NODES - 1) as f64, 0.0));
+        let nodes = angles
+            .par_iter()
+            .map(|&theta_o| {
+                let plane = Plane::new(direction(theta_o, 0.0));
                 Node::new(&plane, &borders, &mut vec![0.0; channels], &eval)
             })
             .collect();
-        Self { nodes, borders }
+        Self { nodes, angles, borders }
     }
 
     /// The nodes that enclose θo, with their weights.
     fn enclosing(&self, wo: DVec3) -> [(&Node, f64); 2] {
-        let position = (theta_of(wo) / LAST_NODE).clamp(0.0, 1.0) * (NODES - 1) as f64;
-        let low = (position as usize).min(NODES - 2);
-        let t = position - low as f64;
+        let theta_o = theta_of(wo).min(LAST_NODE);
+        let low = self.angles.partition_point(|&angle| angle <= theta_o).clamp(1, self.angles.len() - 1) - 1;
+        let t = (theta_o - self.angles[low]) / (self.angles[low + 1] - self.angles[low]);
         [(&self.nodes[low], 1.0 - t), (&self.nodes[low + 1], t)]
     }
 
@@ -132,6 +136,15 @@ impl Sampler {
     }
 }
 
+/// θo of the nodes, ascending: the even ones and `extra`.
+fn node_angles(extra: &[f64]) -> Vec<f64> {
+    let even = (0..NODES).map(|k| LAST_NODE * k as f64 / (NODES - 1) as f64);
+    let mut angles: Vec<f64> = even.chain(extra.iter().copied().filter(|t| (0.0..LAST_NODE).contains(t))).collect();
+    angles.sort_by(f64::total_cmp);
+    angles.dedup();
+    angles
+}
+
 /// sin²(θ/2) at the borders of the rows, θ = (k/ROWS)²·θmax.
 fn row_borders(chart: Chart) -> Vec<f64> {
     (0..=ROWS).map(|k| (0.5 * row_theta(chart, k as f64)).sin().powi(2)).collect()
@@ -153,7 +166,7 @@ impl Node {
     fn new(plane: &Plane, borders: &[Vec<f64>; 2], scratch: &mut [f64], eval: &impl Evaluate) -> Self {
         let tables = [0, 1].map(|c| {
             let mut reflected = |at: Polar| reflected(Chart::BOTH[c], plane, at, scratch, eval);
-            tabulate(Chart::BOTH[c], &borders[c], &mut reflected)
+            tabulate(Chart::BOTH[c], plane, &borders[c], &mut reflected)
         });
         let sums = [0, 1].map(|c| tables[c].iter().sum::<f64>());
         let total = sums[0] + sums[1];
@@ -173,25 +186,46 @@ fn reflected(chart: Chart, plane: &Plane, at: Polar, scratch: &mut [f64], eval: 
     if value.is_finite() { value.max(0.0) } else { 0.0 }
 }
 
-/// Each cell's solid angle times the root mean square of `f` over 2 × 2 Gauss points: of all piecewise-constant densities,
-/// the one in proportion to the root mean square gives the estimate of ∫ f the least variance.
-fn tabulate(chart: Chart, borders: &[f64], f: &mut impl FnMut(Polar) -> f64) -> Vec<f64> {
-    let gauss = [0.5 - 0.5 / 3f64.sqrt(), 0.5 + 0.5 / 3f64.sqrt()];
+/// Each cell's solid angle times the root mean square of what it reflects: of all piecewise-constant densities, the one in
+/// proportion to the root mean square gives the estimate of the integral the least variance.
+fn tabulate(chart: Chart, plane: &Plane, borders: &[f64], reflected: &mut impl FnMut(Polar) -> f64) -> Vec<f64> {
     let mut cells = Vec::with_capacity(ROWS * COLUMNS);
     for row in 0..ROWS {
         let (low, high) = (row_theta(chart, row as f64), row_theta(chart, row as f64 + 1.0));
         let solid_angle = cos_difference(low, high) * PI / COLUMNS as f64;
         for column in 0..COLUMNS {
+            let at = |s: f64, t: f64| place(borders, (row, s), (column, t));
+            let above = |s: f64, t: f64| chart.light(plane, at(s, t)).is_some();
+            let corners = [above(0.0, 0.0), above(0.0, 1.0), above(1.0, 0.0), above(1.0, 1.0)];
+            let points: &[f64] = match corners.iter().filter(|&&above| above).count() {
+                0 => &[],
+                4 => &GAUSS,
+                _ => &FINE,
+            };
             let mut squares = 0.0;
-            for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                let v = borders[row] + gauss[a] * (borders[row + 1] - borders[row]);
-                let (sin_phi, cos_phi) = (PI * (column as f64 + gauss[b]) / COLUMNS as f64).sin_cos();
-                squares += 0.25 * f(Polar { v, cos_phi, sin_phi }).powi(2);
+            for (m, &s) in points.iter().enumerate() {
+                for (n, &t) in points.iter().enumerate() {
+                    // Every other point on the far side of the plane of incidence: a table need not be symmetric.
+                    let side = if (m + n) % 2 == 0 { 1.0 } else { -1.0 };
+                    squares += reflected(at(s, t).on_side(side)).powi(2);
+                }
             }
-            cells.push(solid_angle * squares.sqrt());
+            cells.push(solid_angle * (squares / (points.len() * points.len()).max(1) as f64).sqrt());
         }
     }
     cells
+}
+
+/// Where a cell is looked at, each way: the two Gauss points.
+const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+/// Where a cell is looked at that the horizon cuts.
+const FINE: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
+
+/// The place at these fractions of a row (by solid angle) and of a column.
+fn place(borders: &[f64], (row, s): (usize, f64), (column, t): (usize, f64)) -> Polar {
+    let v = borders[row] + s * (borders[row + 1] - borders[row]);
+    let (sin_phi, cos_phi) = (PI * (column as f64 + t) / COLUMNS as f64).sin_cos();
+    Polar { v, cos_phi, sin_phi }
 }
 
 impl Distribution {
@@ -210,9 +244,7 @@ impl Distribution {
         let (row, s) = invert(&self.rows, u0);
         let (side, u1) = if u1 < 0.5 { (1.0, 2.0 * u1) } else { (-1.0, 2.0 - 2.0 * u1) };
         let (column, t) = invert(self.row(row), u1);
-        let v = borders[row] + s * (borders[row + 1] - borders[row]);
-        let (sin_phi, cos_phi) = (PI * (column as f64 + t) / COLUMNS as f64).sin_cos();
-        Polar { v, cos_phi, sin_phi: side * sin_phi }
+        place(borders, (row, s), (column, t)).on_side(side)
     }
 
     /// Density of [`Self::draw`] in a cell, per sr of the chart.

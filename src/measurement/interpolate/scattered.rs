@@ -101,6 +101,12 @@ impl Scattered {
         }
     }
 
+    /// Polar angles (rad) at which what is covered changes abruptly: the last incidence, and just beyond.
+    pub(super) fn breaks(&self) -> Vec<f64> {
+        let last = self.incidences.last().map(|incidence| incidence.theta);
+        last.into_iter().flat_map(|theta| [theta, theta + SAME_INCIDENCE]).collect()
+    }
+
     /// The interpolated value of every channel; `false`, with `out` undefined, outside of what was measured.
     pub(super) fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool {
         let (a, b) = if self.exchanged { (wo, wi) } else { (wi, wo) };
