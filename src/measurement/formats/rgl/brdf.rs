@@ -43,8 +43,8 @@ impl Symmetry {
 /// the gaps of the measurement, as its authors do; negative values are colours out of gamut and are kept.
 ///
 /// Conditioned on the light (θi is the polar angle of `wi`), a file need not be reciprocal. What it stores is f cosθo, which the
-/// real files do not let vanish at the horizon: f grows as 1/cosθo over the last degrees of θo, and the albedo for light that
-/// leaves there exceeds 1.
+/// real files do not let vanish at the horizon: f grows as 1/cosθo over the last degree of θo, and ∫ f cosθi dωi
+/// exceeds 1 there (in all five real files that were looked at by θo = 89.9°).
 #[derive(Debug, Clone)]
 pub struct RglBrdf {
     pub(super) channels: Vec<String>,
