@@ -42,7 +42,9 @@ impl Symmetry {
 /// A measured BRDF in the adaptive parameterisation. It is evaluated wherever both directions are above the horizon, also in
 /// the gaps of the measurement, as its authors do; negative values are colours out of gamut and are kept.
 ///
-/// Conditioned on the light (θi is the polar angle of `wi`), a file need not be reciprocal.
+/// Conditioned on the light (θi is the polar angle of `wi`), a file need not be reciprocal. What it stores is f cosθo, which the
+/// real files do not let vanish at the horizon: f grows as 1/cosθo over the last degree of θo, and ∫ f cosθi dωi
+/// exceeds 1 there (in all five real files that were looked at by θo = 89.9°).
 #[derive(Debug, Clone)]
 pub struct RglBrdf {
     pub(super) channels: Vec<String>,

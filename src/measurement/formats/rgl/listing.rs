@@ -15,6 +15,9 @@ use super::warp::Cell;
 use crate::geometry::grid::{cell_borders, polar_cells};
 use crate::measurement::Masked;
 
+/// Pieces each way that a cell is cut into at most, to integrate over it.
+const FINEST: usize = 8;
+
 /// All entries of a file; values channel-major, NaN where masked.
 pub(super) struct Listing {
     pub wi: Vec<DVec3>,
@@ -79,31 +82,61 @@ impl Slice {
 /// Solid angle (sr) of wo above the horizon that each node of one incidence stands for.
 ///
 /// The integral ∫ hat(s) dωo runs over u, where dωo = 4 (wi·m) 2π² u sinθm du is smooth and s(u) is the warp's inverse; in s the
-/// Jacobian is singular where the density vanishes. A cell of the density's grid is cut the finer the more nodes of s it spans.
+/// Jacobian is singular where the density vanishes. A cell of the density's grid is cut the finer the more nodes of s it spans,
+/// and finest where the horizon crosses it.
 fn solid_angles(brdf: &RglBrdf, p: usize, t: usize) -> Vec<f64> {
     let (nx, ny) = (brdf.values.nx, brdf.values.ny);
     let (incidence, wi) = brdf.stored_incidence(p, t);
     let (cells_x, cells_y) = brdf.vndf.cells();
-    let s_of = |u: DVec2| brdf.vndf.invert(u, &incidence.mix).0;
+    let size = DVec2::new(1.0 / cells_x as f64, 1.0 / cells_y as f64);
+    let at = |u: DVec2| {
+        let m = incidence.normal(u);
+        Place { s: brdf.vndf.invert(u, &incidence.mix).0, cos_d: wi.dot(m), rises: reflect(wi, m).z > 0.0 }
+    };
+    let corner = |k: usize| DVec2::new((k % (cells_x + 1)) as f64, (k / (cells_x + 1)) as f64) * size;
+    let corners: Vec<Place> = (0..(cells_x + 1) * (cells_y + 1)).map(|k| at(corner(k))).collect();
     let mut out = vec![0.0; nx * ny];
     for cell in 0..cells_x * cells_y {
-        let size = DVec2::new(1.0 / cells_x as f64, 1.0 / cells_y as f64);
-        let corner = DVec2::new((cell % cells_x) as f64, (cell / cells_x) as f64) * size;
-        let span = (s_of(corner + size) - s_of(corner)).abs() * DVec2::new((nx - 1) as f64, (ny - 1) as f64);
-        let cuts = ((2.0 * span.max_element()).ceil() as usize).clamp(1, 8);
+        let first = cell / cells_x * (cells_x + 1) + cell % cells_x;
+        let around = [first, first + 1, first + cells_x + 1, first + cells_x + 2].map(|k| corners[k]);
+        let cuts = cuts(&around, DVec2::new((nx - 1) as f64, (ny - 1) as f64));
         for k in 0..cuts * cuts {
-            let inside = DVec2::new((k % cuts) as f64 + 0.5, (k / cuts) as f64 + 0.5) / cuts as f64;
-            let u = corner + inside * size;
-            let m = incidence.normal(u);
-            let area = 4.0 * wi.dot(m) * solid_angle_per_area(u.x) * size.x * size.y / (cuts * cuts) as f64;
-            if area > 0.0 && reflect(wi, m).z > 0.0 {
-                for (i, j, share) in Cell::at(nx, ny, s_of(u)).corners() {
-                    out[j * nx + i] += share * area;
+            let u = corner(first) + DVec2::new((k % cuts) as f64 + 0.5, (k / cuts) as f64 + 0.5) * size / cuts as f64;
+            let place = at(u);
+            if place.rises && place.cos_d > 0.0 {
+                let area = size.x * size.y / (cuts * cuts) as f64;
+                let solid_angle = 4.0 * place.cos_d * solid_angle_per_area(u.x) * area;
+                for (i, j, share) in Cell::at(nx, ny, place.s).corners() {
+                    out[j * nx + i] += share * solid_angle;
                 }
             }
         }
     }
     out
+}
+
+/// A point of the square of normals.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Its preimage under the warp.
+    s: DVec2,
+    /// wi·m.
+    cos_d: f64,
+    /// Whether wo is above the horizon.
+    rises: bool,
+}
+
+/// Pieces each way to cut a cell into, from its corners: none where it lies below the horizon.
+fn cuts(corners: &[Place; 4], nodes: DVec2) -> usize {
+    match corners.iter().filter(|c| c.rises).count() {
+        0 => 0,
+        4 => {
+            let low = corners.iter().fold(DVec2::ONE, |low, c| low.min(c.s));
+            let high = corners.iter().fold(DVec2::ZERO, |high, c| high.max(c.s));
+            ((2.0 * ((high - low) * nodes).max_element()).ceil() as usize).clamp(1, FINEST)
+        }
+        _ => FINEST,
+    }
 }
 
 /// dωi dωo of every entry, sr².

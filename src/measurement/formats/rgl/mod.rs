@@ -6,6 +6,8 @@
 mod brdf;
 mod listing;
 mod tensor;
+#[cfg(test)]
+mod tests;
 mod warp;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -87,7 +89,7 @@ fn brdf_of(file: &TensorFile<'_>, values_field: &str, channels: Vec<String>) -> 
 
 /// Strictly ascending finite angles.
 fn ascending(file: &TensorFile<'_>, name: &str) -> Result<Vec<f64>, MeasurementError> {
-    let nodes: Vec<f64> = file.bounded(name, 1, f32::MIN)?.values.into_iter().map(f64::from).collect();
+    let nodes: Vec<f64> = file.bounded(name, 1, f32::NEG_INFINITY)?.values.into_iter().map(f64::from).collect();
     match nodes.windows(2).position(|pair| pair[0] >= pair[1]) {
         None => Ok(nodes),
         Some(i) => Err(file.invalid(entry(name, i + 1), format!("more than {}", nodes[i]), nodes[i + 1].to_string())),
@@ -140,9 +142,6 @@ fn values(
 /// A range of azimuths names the symmetry: up to two of them an isotropic material, else the whole, half or quarter turn from −π.
 fn symmetry(file: &TensorFile<'_>, phi_i: &[f64]) -> Result<Symmetry, MeasurementError> {
     let [first, _, .., last] = phi_i else { return Ok(Symmetry::Isotropic) };
-    if phi_i.len() == 2 {
-        return Ok(Symmetry::Isotropic);
-    }
     let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
     match TAU / (last - first) {
         turn if near(*first, -PI) && near(turn, 1.0) => Ok(Symmetry::None),

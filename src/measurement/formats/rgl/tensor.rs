@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::super::MeasurementError;
+use crate::measurement::MeasurementError;
 
 const MAGIC: &[u8] = b"tensor_file\0";
 
@@ -103,13 +103,13 @@ impl<'a> TensorFile<'a> {
         Ok(Floats { shape: field.shape.clone(), values: entries.iter().map(|b| f32::from_le_bytes(*b)).collect() })
     }
 
-    /// The f32 field `name` of `rank` dimensions whose entries are all finite and at least `low`.
+    /// The f32 field `name` of `rank` dimensions whose entries are all finite and at least `low` (−∞: any).
     pub fn bounded(&self, name: &str, rank: usize, low: f32) -> Result<Floats, MeasurementError> {
         let floats = self.floats(name, rank)?;
         match floats.values.iter().position(|v| !(v.is_finite() && *v >= low)) {
             None => Ok(floats),
             Some(i) => {
-                let least = if low == f32::MIN { String::new() } else { format!(", at least {low:e}") };
+                let least = if low.is_finite() { format!(", at least {low:e}") } else { String::new() };
                 let found = floats.values.get(i).map_or_else(String::new, f32::to_string);
                 Err(self.invalid(entry(name, i), format!("a finite number{least}"), found))
             }
