@@ -1,4 +1,5 @@
 //! The fit against known truths.
+#![allow(clippy::expect_used, clippy::panic)] // helpers of tests
 
 use goniofit::brdf::{LobeKind, Material, PerChannel};
 use goniofit::control::Control;

@@ -1,6 +1,5 @@
 //! The demo: a built-in glossy material is measured with noise, fitted twice, rendered and compared with the truth.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
@@ -81,7 +80,7 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
     };
 
     let scan = Scan::Hemisphere { step_deg: 5.0 };
-    let source = Source::Fitted(truth.clone());
+    let source = Source::Fitted(Box::new(truth.clone()));
     let table = measure(MATERIAL, &source, &Instrument::default(), &scan, options.seed, control)?;
     lap("measure");
     write_csv(&folder.join("measurement.csv"), &table)?;
@@ -106,7 +105,7 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
             seed: options.seed + k as u64,
             ..Options::of(&stage.spec)
         };
-        let subject = render_material(name, &Source::Fitted(material.clone()), None)?;
+        let subject = render_material(name, &Source::Fitted(Box::new(material.clone())), None)?;
         let image = picture(&stage, Some(subject), &settings, control)?;
         let label = if k == 0 { "truth".to_owned() } else { format!("fit: {name}") };
         shown.push(Shown { file: name.into(), difference_file: format!("difference-{name}"), label, image });

@@ -45,7 +45,7 @@ pub fn measure(
 /// # Errors
 /// As [`measure`].
 pub fn tabulate(name: &str, material: &Material, scan: &Scan, control: Control<'_>) -> Result<Measurement, ChainError> {
-    let source = Source::Fitted(material.clone());
+    let source = Source::Fitted(Box::new(material.clone()));
     let mut table = measure(name, &source, &Instrument::noiseless(), scan, 0, control)?;
     table.origin = format!("{} sampled on {scan}", material.model());
     Ok(table)

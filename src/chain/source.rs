@@ -15,7 +15,7 @@ use crate::render;
 #[derive(Debug)]
 pub enum Source {
     /// A fitted or built-in material.
-    Fitted(Material),
+    Fitted(Box<Material>),
     /// A measurement.
     Measured(Box<Measurement>),
 }
@@ -37,7 +37,7 @@ impl Source {
 /// [`ChainError`] naming what was looked for and what was found.
 pub fn load(name: &str, options: &ReadOptions) -> Result<Source, ChainError> {
     if let Some(built_in) = BuiltInMaterial::find(name) {
-        return Ok(Source::Fitted(built_in.material()));
+        return Ok(Source::Fitted(Box::new(built_in.material())));
     }
     let path = Path::new(name);
     if name == "-" {
@@ -63,7 +63,7 @@ pub fn load(name: &str, options: &ReadOptions) -> Result<Source, ChainError> {
 /// [`ChainError`]; a measurement is refused.
 pub fn load_material(name: &str) -> Result<Material, ChainError> {
     match load(name, &ReadOptions::default())? {
-        Source::Fitted(material) => Ok(material),
+        Source::Fitted(material) => Ok(*material),
         Source::Measured(_) => Err(ChainError::NotAMaterial { path: name.into() }),
     }
 }
@@ -91,7 +91,7 @@ fn from_bytes(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Sour
     let text = String::from_utf8(bytes).map_err(|e| ChainError::io(path, std::io::Error::other(e)))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let material = Material::from_json(text).map_err(|source| ChainError::Material { path: path.into(), source })?;
-    Ok(Source::Fitted(material))
+    Ok(Source::Fitted(Box::new(material)))
 }
 
 /// Which channels to show: three as red, green and blue, or one as grey.

@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ui.note(&format!("note: {note}"));
     }
     write_measurement(&table, &args.out, format, ui)?;
-    if args.out != PathBuf::from("-") {
+    if args.out.as_os_str() != "-" {
         let text = format!("{}: {} direction pairs as {}", args.out.display(), table.len(), format.description());
         ui.result(&text, &json!({ "out": args.out, "entries": table.len(), "format": format.name() }));
     }

@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let table = chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
     write_measurement(&table, &args.out, format, ui)?;
     let valid = table.values.len() as u64 - table.masked.total();
-    if args.out != PathBuf::from("-") {
+    if args.out.as_os_str() != "-" {
         let text = format!(
             "{}: {} direction pairs, {valid} valid values, scan {}, seed {}",
             args.out.display(),

@@ -49,7 +49,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let mut others = Vec::new();
     for (k, (file, material)) in fits.iter().enumerate() {
         let label = format!("fit: {}", material.model());
-        others.push(studio.shown(k as u64 + 1, &label, file, &Source::Fitted(material.clone()))?);
+        others.push(studio.shown(k as u64 + 1, &label, file, &Source::Fitted(Box::new(material.clone())))?);
     }
     if ui::stop().requested() {
         ui.warn("stopped: the pictures have fewer samples than asked for");

@@ -124,24 +124,19 @@ fn channel_sums(
                     }
                 })
                 .collect();
-            let mut sums = zero.clone();
             let columns: Vec<&Vec<f64>> = phi.iter().chain(&slope).collect();
-            for a in 0..k {
-                let wa: Vec<f64> = columns[a].iter().zip(w).map(|(x, w)| x * w).collect();
-                let va: Vec<f64> = columns[a].iter().zip(&variance).map(|(x, v)| x * v).collect();
-                for b in 0..=a {
-                    sums.normal[(a, b)] = dot(&wa, columns[b]);
-                    sums.spread[(a, b)] = dot(&va, columns[b]);
-                    sums.normal[(b, a)] = sums.normal[(a, b)];
-                    sums.spread[(b, a)] = sums.spread[(a, b)];
+            let mut sums = zero.clone();
+            for (a, column) in columns.iter().enumerate() {
+                let scaled = |by: &[f64]| column.iter().zip(by).map(|(x, w)| x * w).collect::<Vec<f64>>();
+                let (weighted, spread) = (scaled(w), scaled(&variance));
+                for (b, other) in columns.iter().enumerate() {
+                    sums.normal[(a, b)] = dot(&weighted, other);
+                    sums.spread[(a, b)] = dot(&spread, other);
                 }
                 for (component, total) in sums.common.iter_mut().enumerate() {
                     let u = measurement.common_plane(component, channel);
-                    let shared = index
-                        .iter()
-                        .zip(g)
-                        .map(|(&i, g)| if u[i as usize].is_finite() { g * u[i as usize] } else { 0.0 });
-                    total[a] = wa.iter().zip(shared).map(|(wa, u)| wa * u).sum();
+                    let moved = |(&i, g): (&u32, &f64)| if u[i as usize].is_finite() { g * u[i as usize] } else { 0.0 };
+                    total[a] = weighted.iter().zip(index.iter().zip(g).map(moved)).map(|(w, u)| w * u).sum();
                 }
             }
             sums

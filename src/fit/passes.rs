@@ -115,7 +115,7 @@ pub(super) fn moments(samples: &Samples, lobes: &[ShapedLobe], slopes: bool) -> 
 
 impl Moments {
     fn symmetric(mut self) -> Self {
-        self.gram.iter_mut().for_each(|g| g.fill_upper_triangle_with_lower_triangle());
+        self.gram.iter_mut().for_each(DMatrix::fill_upper_triangle_with_lower_triangle);
         self
     }
 }

@@ -75,7 +75,7 @@ impl Facts<'_> {
             let interval = error.map(|e| (value * (-q * e).exp(), value * (q * e).exp()));
             row.interval.shape.push((parameter.name.into(), PerChannel::Shared(interval)));
         }
-        if !(dark && !shape.is_empty()) {
+        if !dark || shape.is_empty() {
             row.term.shape = Some(shape);
         }
         row

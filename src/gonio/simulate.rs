@@ -27,7 +27,7 @@ pub fn simulate(
     let (directions, weights) = scan.directions()?;
     let (n, width) = (directions.len(), channels.len());
     control.progress.start("measuring", n as u64);
-    let blocks: Vec<(Vec<f64>, Vec<f64>)> = (0..n.div_ceil(BLOCK))
+    let blocks: Vec<Block> = (0..n.div_ceil(BLOCK))
         .into_par_iter()
         .map(|b| {
             let range = b * BLOCK..((b + 1) * BLOCK).min(n);
@@ -48,9 +48,9 @@ pub fn simulate(
         })
         .collect();
     control.progress.finish();
-    let values = join_planes(width, blocks.iter().map(|b| &b.0));
+    let values = join_planes(width, &blocks, |b| &b.0);
     let marked = values.iter().filter(|v| v.is_nan()).count() as u64;
-    let sigma = instrument.is_noisy().then(|| join_planes(width, blocks.iter().map(|b| &b.1)));
+    let sigma = instrument.is_noisy().then(|| join_planes(width, &blocks, |b| &b.1));
     Some(Measurement {
         origin: format!("simulated, scan {scan}, seed {seed}"),
         dimension: scan.dimension(),
@@ -61,10 +61,13 @@ pub fn simulate(
     })
 }
 
-/// Channel-major blocks joined to channel-major planes.
-fn join_planes<'a>(width: usize, blocks: impl Iterator<Item = &'a Vec<f64>> + Clone) -> Vec<f64> {
+/// Values and σ of a block, each channel-major.
+type Block = (Vec<f64>, Vec<f64>);
+
+/// One part of channel-major blocks, joined to channel-major planes.
+fn join_planes(width: usize, blocks: &[Block], part: fn(&Block) -> &Vec<f64>) -> Vec<f64> {
     let plane = |c: usize| {
-        blocks.clone().flat_map(move |b| {
+        blocks.iter().map(part).flat_map(move |b| {
             let len = b.len() / width;
             b[c * len..(c + 1) * len].iter().copied()
         })
