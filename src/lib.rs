@@ -7,3 +7,4 @@ pub mod control;
 pub mod geometry;
 pub mod measurement;
 pub mod numeric;
+pub mod radiometry;
