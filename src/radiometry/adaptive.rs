@@ -1,10 +1,16 @@
 //! Integrals that state their error: adaptive Gauss–Legendre quadrature on intervals and rectangles.
 //!
-//! Every cell is integrated with 6 and with 9 points a side; the difference is taken for the error of the 9-point value,
-//! which for smooth integrands it overstates by far. Where the integrand has a kink or a jump the two may agree by chance, so
-//! no cell's error is taken for less than its share of an eighth of what the value of its parent changed when that was split.
-//! The cell with the largest error is halved along every axis until the sum of the errors meets the tolerance. What lies wholly between the points of the first cells (a far, tiny light) is not
-//! seen: integrate over its own directions instead, or raise `cells`.
+//! Every cell is integrated by the 9-point Gauss–Legendre rule a side, and beside it, one axis at a time, by a 6-point rule
+//! with points at the cell's borders, which sees what happens between them and the first point of the other. Twice the sum
+//! of the differences is taken for the error, but not less than twice the cell's share of what splitting its parent
+//! changed. The cell with the largest error is halved along the axis with the largest difference until the sum of
+//! the errors meets the tolerance.
+//!
+//! How good that is: for smooth integrands it overstates the error by far; over random places of a jump, a kink or a square
+//! root's edge on a line, the stated error held in more than 99 cases of 100. In the plane a jump that runs along a cell's
+//! border, or meets it at a tip, can still hide for a while, and jumps cost: cut the domain there if you can. What lies
+//! wholly between the points of the first cells (a far, tiny light) is not seen: integrate over its own directions
+//! instead, or raise `cells`.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -12,10 +18,20 @@ use std::collections::BinaryHeap;
 use super::quantity::Quantity;
 use crate::numeric::quadrature::gauss_legendre;
 
-const LOW_ORDER: usize = 6;
-const HIGH_ORDER: usize = 9;
-/// Share of a split's change that its parts must own up to.
-const PARENT_SHARE: f64 = 0.125;
+/// Points of the Gauss–Legendre rule that gives the value.
+const ORDER: usize = 9;
+/// The rule it is compared with: (node, weight) on [−1, 1], Lobatto's with 6 points but for its ends, which stand 2⁻²⁰ inside
+/// so that a border itself is never evaluated; the others are those that make it exact to degree 9 again.
+const BORDER_RULE: [(f64, f64); 6] = [
+    (-0.999_999_046_325_683_6, 0.066_667_556_769_061_8),
+    (-0.765_054_594_310_632_9, 0.378_474_595_353_420_1),
+    (-0.285_231_244_460_758, 0.554_857_847_877_518_1),
+    (0.285_231_244_460_758, 0.554_857_847_877_518_1),
+    (0.765_054_594_310_632_9, 0.378_474_595_353_420_1),
+    (0.999_999_046_325_683_6, 0.066_667_556_769_061_8),
+];
+/// The stated error is this multiple of what was seen.
+const SAFETY: f64 = 2.0;
 
 /// How accurate an integral is to be, and what it may cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +122,7 @@ impl Quadrature {
             sum.evaluations += evaluations_per_cell::<N>();
             parent.split_into(&mut heap, &mut sum, f)?;
         }
-        let step = (1 << N) * evaluations_per_cell::<N>();
+        let step = 2 * evaluations_per_cell::<N>();
         while !sum.meets(self) && sum.evaluations + step <= self.max_evaluations {
             let Some(worst) = heap.pop() else { break };
             sum.remove(&worst);
@@ -122,6 +138,7 @@ struct Sum {
     value: f64,
     error: f64,
     magnitude: f64,
+    cells: usize,
     evaluations: usize,
 }
 
@@ -130,6 +147,7 @@ impl Sum {
         self.value += cell.value;
         self.error += cell.error;
         self.magnitude += cell.magnitude;
+        self.cells += 1;
         self.evaluations += evaluations_per_cell::<N>();
     }
 
@@ -137,11 +155,12 @@ impl Sum {
         self.value -= cell.value;
         self.error -= cell.error;
         self.magnitude -= cell.magnitude;
+        self.cells -= 1;
     }
 
-    /// The rounding that no splitting removes: a few units in the last place of ∫ |f|.
+    /// The rounding that no splitting removes: some units in the last place of ∫ |f|, and the random walk of adding the cells.
     fn rounding(&self) -> f64 {
-        8.0 * f64::EPSILON * self.magnitude
+        (8.0 + (self.cells as f64).sqrt()) * f64::EPSILON * self.magnitude
     }
 
     fn meets(&self, wanted: &Quadrature) -> bool {
@@ -171,34 +190,39 @@ struct Cell<const N: usize> {
     value: f64,
     error: f64,
     magnitude: f64,
+    /// The axis along which it is worst.
+    axis: usize,
 }
 
 impl<const N: usize> Cell<N> {
     fn new((low, high): ([f64; N], [f64; N]), f: &mut dyn FnMut([f64; N]) -> f64) -> Option<Self> {
-        let (rough, _) = tensor_rule(LOW_ORDER, low, high, f);
-        let (value, magnitude) = tensor_rule(HIGH_ORDER, low, high, f);
-        let error = (value - rough).abs();
-        (error.is_finite() && magnitude.is_finite()).then_some(Self { low, high, value, error, magnitude })
+        let gauss = gauss_legendre(ORDER);
+        let (value, magnitude) = tensor_rule([gauss.as_slice(); N], low, high, f);
+        let (mut axis, mut largest, mut sum) = (0, 0.0, 0.0);
+        for tried in 0..N {
+            let rules = std::array::from_fn(|a| if a == tried { &BORDER_RULE } else { gauss.as_slice() });
+            let difference = (value - tensor_rule(rules, low, high, f).0).abs();
+            sum += difference;
+            if difference > largest {
+                (axis, largest) = (tried, difference);
+            }
+        }
+        let error = SAFETY * sum;
+        (error.is_finite() && magnitude.is_finite()).then_some(Self { low, high, value, error, magnitude, axis })
     }
 
-    /// Puts the halves of this cell along every axis into the heap and the sum.
-    fn split_into(
-        &self,
-        heap: &mut BinaryHeap<Self>,
-        sum: &mut Sum,
-        f: &mut dyn FnMut([f64; N]) -> f64,
-    ) -> Option<()> {
-        let mut children = Vec::with_capacity(1 << N);
-        for child in split(self.low, self.high, 2) {
-            children.push(Self::new(child, f)?);
+    /// Puts the halves of this cell into the heap and the sum.
+    fn split_into(&self, heap: &mut BinaryHeap<Self>, sum: &mut Sum, f: &mut dyn FnMut([f64; N]) -> f64) -> Option<()> {
+        let (mut below, mut above) = (self.high, self.low);
+        let middle = 0.5 * self.low[self.axis] + 0.5 * self.high[self.axis];
+        (below[self.axis], above[self.axis]) = (middle, middle);
+        let (mut first, mut second) = (Self::new((self.low, below), f)?, Self::new((above, self.high), f)?);
+        let least = 0.5 * SAFETY * (first.value + second.value - self.value).abs();
+        for half in [&mut first, &mut second] {
+            half.error = half.error.max(least);
+            sum.add(half);
         }
-        let change = (children.iter().map(|child| child.value).sum::<f64>() - self.value).abs();
-        let least = PARENT_SHARE * change / children.len() as f64;
-        for mut child in children {
-            child.error = child.error.max(least);
-            sum.add(&child);
-            heap.push(child);
-        }
+        heap.extend([first, second]);
         Some(())
     }
 }
@@ -221,26 +245,25 @@ impl<const N: usize> PartialEq for Cell<N> {
 impl<const N: usize> Eq for Cell<N> {}
 
 const fn evaluations_per_cell<const N: usize>() -> usize {
-    LOW_ORDER.pow(N as u32) + HIGH_ORDER.pow(N as u32)
+    (ORDER + N * BORDER_RULE.len()) * ORDER.pow(N as u32 - 1)
 }
 
-/// ∫ f and ∫ |f| over a box by the tensor product of the Gauss–Legendre rule of `order` points.
+/// ∫ f and ∫ |f| over a box by the tensor product of one rule on [−1, 1] an axis.
 fn tensor_rule<const N: usize>(
-    order: usize,
+    rules: [&[(f64, f64)]; N],
     low: [f64; N],
     high: [f64; N],
     f: &mut dyn FnMut([f64; N]) -> f64,
 ) -> (f64, f64) {
-    let rule = gauss_legendre(order);
     let (mut value, mut magnitude) = (0.0, 0.0);
-    for index in 0..order.pow(N as u32) {
-        let (mut digits, mut weight, mut x) = (index, 1.0, [0.0; N]);
-        for axis in 0..N {
-            let (node, node_weight) = rule[digits % order];
+    for index in 0..rules.iter().map(|rule| rule.len()).product() {
+        let (mut digits, mut weight, mut x): (usize, _, _) = (index, 1.0, [0.0; N]);
+        for (axis, rule) in rules.iter().enumerate() {
+            let (node, node_weight) = rule[digits % rule.len()];
             let half = 0.5 * (high[axis] - low[axis]);
             x[axis] = low[axis] + half * (1.0 + node);
             weight *= half * node_weight;
-            digits /= order;
+            digits /= rule.len();
         }
         let term = weight * f(x);
         value += term;
@@ -264,29 +287,60 @@ fn split<const N: usize>(low: [f64; N], high: [f64; N], parts: usize) -> impl It
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numeric::random::{Purpose, RngExt, stream};
+
+    /// Share of 1000 random places c for which the stated error held.
+    fn coverage(relative: f64, f: fn(f64, f64) -> f64, exact: fn(f64) -> f64) -> f64 {
+        let rule = Quadrature { relative, ..Quadrature::default() };
+        let mut rng = stream(5, Purpose::Study, 0);
+        let mut held = 0;
+        for _ in 0..1000 {
+            let c: f64 = rng.random();
+            let got = rule.interval((0.0, 1.0), |x| f(x, c)).expect("finite");
+            assert!(got.converged, "c {c}: {got:?}");
+            held += u32::from((got.value - exact(c)).abs() <= got.error);
+        }
+        f64::from(held) / 1000.0
+    }
 
     #[test]
-    fn the_stated_error_holds_for_smooth_kinked_and_jumping_integrands() {
-        let rule = Quadrature { relative: 1e-6, ..Quadrature::default() };
-        let laws: [(&str, &dyn Fn(f64) -> f64, f64); 4] = [
-            ("peak", &|x| 1.0 / (1e-6 + x * x), 2e3 * (1e3f64).atan()),
-            ("kink", &|x: f64| (x - 0.3).abs(), 0.5 * (1.3 * 1.3 + 0.7 * 0.7)),
-            ("jump", &|x| f64::from(u8::from(x > 0.123)), 0.877),
-            ("log", &|x: f64| x.abs().ln(), -2.0),
-        ];
-        for (name, f, want) in laws {
-            let got = rule.interval((-1.0, 1.0), f).expect("finite");
-            assert!(got.converged && (got.value - want).abs() <= got.error, "{name}: {got:?}, exact {want}");
+    fn the_stated_error_always_holds_for_peaks_and_nearly_always_at_jumps_kinks_and_edges() {
+        for relative in [1e-3, 1e-6, 1e-9] {
+            let peak = coverage(relative, |x, c| 1.0 / (x * x + c * c), |c| (1.0 / c).atan() / c);
+            let jump = coverage(relative, |x, c| f64::from(u8::from(x > c)), |c| 1.0 - c);
+            let kink = coverage(relative, |x, c| (x - c).max(0.0), |c| 0.5 * (1.0 - c).powi(2));
+            let edge = coverage(relative, |x, c| (x - c).max(0.0).sqrt(), |c| 2.0 / 3.0 * (1.0 - c).powf(1.5));
+            // What the chapter of this file says, less five standard errors of a share of 1000.
+            let least = 0.99 - 5.0 * f64::sqrt(0.99 * 0.01 / 1000.0);
+            let rough = jump.min(kink).min(edge);
+            assert!(peak == 1.0 && rough > least, "{relative:e}: {peak} {jump} {kink} {edge}");
         }
     }
 
     #[test]
-    fn a_budget_that_is_too_small_is_admitted_and_its_error_is_honest() {
-        let rule = Quadrature { relative: 1e-12, max_evaluations: 20_000, ..Quadrature::default() };
+    fn end_points_may_be_singular() {
+        let got = Quadrature::default().interval((0.0, 1.0), f64::ln).expect("finite inside");
+        assert!(got.converged && (got.value + 1.0).abs() <= got.error, "{got:?}");
+    }
+
+    #[test]
+    fn a_budget_that_is_too_small_is_admitted_and_more_of_it_helps() {
         let disc = |x: f64, y: f64| f64::from(u8::from(x * x + y * y < 1.0));
-        let got = rule.rectangle((-1.0, 1.0), (-1.0, 1.0), disc).expect("finite");
-        assert!(!got.converged && got.evaluations <= 20_000);
-        assert!((got.value - std::f64::consts::PI).abs() <= got.error && got.error < 0.05, "{got:?}");
+        let errors = [20_000, 80_000, 320_000].map(|max_evaluations| {
+            let rule = Quadrature { relative: 1e-12, max_evaluations, ..Quadrature::default() };
+            let got = rule.rectangle((-1.0, 1.0), (-1.0, 1.0), disc).expect("finite");
+            assert!(!got.converged && got.evaluations <= max_evaluations);
+            assert!((got.value - std::f64::consts::PI).abs() <= got.error, "{got:?}");
+            got.error
+        });
+        assert!(errors[0] > 1.5 * errors[1] && errors[1] > 1.5 * errors[2], "{errors:?}");
+    }
+
+    #[test]
+    fn a_jump_along_an_axis_costs_little() {
+        let rule = Quadrature { relative: 1e-6, ..Quadrature::default() };
+        let got = rule.rectangle((0.0, 1.0), (0.0, 1.0), |x, _| f64::from(u8::from(x < 0.3))).expect("finite");
+        assert!(got.converged && (got.value - 0.3).abs() <= got.error && got.evaluations < 50_000, "{got:?}");
     }
 
     #[test]

@@ -52,8 +52,8 @@ pub struct PointSource<F> {
     pub intensity: F,
 }
 
-/// Irradiance H(p) = Σ I_k · max(0, n·(e_k − p))/|e_k − p|³ of the point `p` (m) with normal `n` from point sources at e_k,
-/// each of the intensity that it has along p − e_k. `n` need not be of unit length.
+/// Irradiance `H(p) = Σ I_k · max(0, n·(e_k − p))/|e_k − p|³` of the point `p` (m) with normal `n` from point sources at `e_k`,
+/// each of the intensity that it has along `p − e_k`. `n` need not be of unit length.
 ///
 /// `None` when `p` is on a source, `n` is 0, or something is not finite.
 /// ```
@@ -166,7 +166,7 @@ pub struct Patch {
     pub area: Area,
 }
 
-/// Irradiance L · A_q cosθq cosθp/r² that the patch `q`, of radiance L towards `p`, causes at the point `p` (m) with normal
+/// Irradiance `L · A_q cosθq cosθp/r²` that the patch `q`, of radiance L towards `p`, causes at the point `p` (m) with normal
 /// `n`; 0 when either turns its back on the other. `None` when they coincide or something is not finite.
 /// ```
 /// # use goniofit::radiometry::*;

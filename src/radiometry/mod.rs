@@ -38,3 +38,8 @@ pub use reflection::{
     transport_step,
 };
 pub use shading::PhongShading;
+
+/// Runs the example of the users' chapter.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/radiometry.md")]
+struct Chapter;

@@ -1,7 +1,7 @@
 //! Irradiance from a polygon of even radiance: Lambert's closed form (Photometria, 1760), kept accurate at every size.
 //!
-//! With the vectors v_i from the point to the vertices, H = (L/2) Σ Θ_i n·Γ_i over the edges, Θ_i the angle between v_i and
-//! v_{i+1} and Γ_i the unit normal of their plane, after the polygon has been cut at the horizon. The terms are of the size s
+//! With the vectors `v_i` from the point to the vertices, `H = (L/2) Σ Θ_i n·Γ_i` over the edges, `Θ_i` the angle between `v_i`
+//! and `v_{i+1}` and `Γ_i` the unit normal of their plane, after the polygon has been cut at the horizon. The terms are of the size s
 //! of the polygon against its distance and their sum of the size s², or s³ at the horizon: for a small polygon all digits
 //! would go. So below s = 1/10 the area integral L ∫ cosθ cosθ'/r² dA is taken by Gauss–Legendre quadrature instead, whose
 //! terms are all of one sign and which is exact to rounding at that size.
@@ -41,11 +41,13 @@ const ORDER: usize = 8;
 /// let got = irradiance_from_polygon(&square, l, DVec3::ZERO, DVec3::Z).unwrap();
 /// let x = a / f64::hypot(a, h);
 /// assert!((got.value() / (4.0 * 10.0 * x * x.atan()) - 1.0).abs() < 1e-14);
-/// // The same by the extended source: a ray from p meets the square when |wi.x|, |wi.y| < a wi.z/h.
+/// // Tilted, and by the extended source: a ray from p meets the square when |wi.x|, |wi.y| < a wi.z/h.
+/// let n = DVec3::new(0.3, 0.1, 1.0);
+/// let closed = irradiance_from_polygon(&square, l, DVec3::ZERO, n).unwrap();
 /// let sky = |wi: DVec3| if wi.x.abs().max(wi.y.abs()) * h < a * wi.z { l } else { Radiance::new(0.0) };
 /// let rough = Quadrature { relative: 1e-3, ..Quadrature::default() };
-/// let by_directions = irradiance_from_extended(DVec3::Z, sky, &rough).unwrap();
-/// assert!((by_directions.value - got).value().abs() <= by_directions.error.value());
+/// let by_directions = irradiance_from_extended(n, sky, &rough).unwrap();
+/// assert!((by_directions.value - closed).value().abs() <= by_directions.error.value() && by_directions.converged);
 /// // From behind it is dark.
 /// assert_eq!(irradiance_from_polygon(&square, l, DVec3::new(0.0, 0.0, 2.0), -DVec3::Z).unwrap(), Irradiance::new(0.0));
 /// ```
@@ -99,7 +101,7 @@ fn local_vertices(vertices: &[DVec3], p: DVec3, n: DVec3) -> Option<Vec<Vertex>>
 /// Whether the polygon lies in the plane of the horizon and has the point on it: then H jumps from 0 to πL.
 fn touches_horizontally(polygon: &[Vertex]) -> bool {
     let flat = polygon.iter().all(|v| v.from_p.z == 0.0);
-    let turn = |(a, b): (&Vertex, &Vertex)| a.from_p.truncate().angle_to(b.from_p.truncate());
+    let turn = |(a, b): (&Vertex, &Vertex)| a.from_p.cross(b.from_p).z.atan2(a.from_p.dot(b.from_p));
     let on_vertex = polygon.iter().any(|v| v.from_p == DVec3::ZERO);
     // The edges turn by ±2π in all round a point inside, by ±π round one on an edge, by 0 round one outside.
     flat && (on_vertex || edges(polygon).map(turn).sum::<f64>().abs() > 1.0)
@@ -186,14 +188,17 @@ mod tests {
     use crate::geometry::direction;
     use crate::radiometry::adaptive::Quadrature;
 
-    /// ∫ max(0, n·v) max(0, −m·v)/|v|⁴ over the parallelogram corner + s a + t b, s, t ∈ [0, 1].
-    fn by_quadrature(corner: DVec3, a: DVec3, b: DVec3, p: DVec3, n: DVec3) -> (f64, f64) {
+    /// ∫ (n·v)(−m·v)/|v|⁴ over the points v = corner + s a + t b, s, t ∈ [0, 1], with n·v > 0; s cut there exactly.
+    fn by_quadrature(corner: DVec3, a: DVec3, b: DVec3, n: DVec3) -> (f64, f64) {
         let m = a.cross(b);
         let rule = Quadrature { relative: 1e-10, cells: 8, ..Quadrature::default() };
         let got = rule
-            .rectangle((0.0, 1.0), (0.0, 1.0), |s, t| {
-                let v = corner + s * a + t * b - p;
-                n.dot(v).max(0.0) * (-m.dot(v)).max(0.0) / v.length_squared().powi(2)
+            .rectangle((0.0, 1.0), (0.0, 1.0), |u, t| {
+                let (start, slope) = (n.dot(corner + t * b), n.dot(a));
+                let cut = (-start / slope).clamp(0.0, 1.0);
+                let (from, to) = if slope > 0.0 { (cut, 1.0) } else { (0.0, cut) };
+                let v = corner + (from + (to - from) * u) * a + t * b;
+                (to - from) * n.dot(v) * -m.dot(v) / v.length_squared().powi(2)
             })
             .expect("finite");
         (got.value, got.error)
@@ -215,7 +220,7 @@ mod tests {
                 let (a, b) = (size * DVec3::new(-0.2, 1.0, 0.3), size * DVec3::new(1.0, 0.1, 0.2));
                 let corner = DVec3::new(0.1, 0.2, 1.5) - 0.5 * (a + b);
                 let closed = factor(&parallelogram(corner, a, b), DVec3::ZERO, n);
-                let (value, error) = by_quadrature(corner, a, b, DVec3::ZERO, n);
+                let (value, error) = by_quadrature(corner, a, b, n);
                 assert!(
                     (closed - value).abs() <= error + 1e-15,
                     "size {size} tilt {tilt}: {closed:e} {value:e} ± {error:e}"

@@ -89,7 +89,7 @@ pub fn radiance_from_point(rho: BrdfValue, intensity: Intensity, cos_i: f64, dis
     (rho * irradiance_tilted(intensity, cos_i, distance)?).finite()
 }
 
-/// Example 2: radiance ∫ ρ(wi, wo) L_in(wi) cosθi dωi along wo under an extended source, in the local frame. `None` when a
+/// Example 2: radiance `∫ ρ(wi, wo) L_in(wi) cosθi dωi` along wo under an extended source, in the local frame. `None` when a
 /// value is not finite.
 /// ```
 /// # use goniofit::radiometry::*;
@@ -127,7 +127,7 @@ pub fn diffuse_brdf(albedo: f64) -> BrdfValue {
     BrdfValue::new(albedo * FRAC_1_PI)
 }
 
-/// Example 4: radiance (albedo/π) ∫ L_in cosθi dωi of a diffuse surface under an extended source (local frame), the same in
+/// Example 4: radiance `(albedo/π) ∫ L_in cosθi dωi` of a diffuse surface under an extended source (local frame), the same in
 /// all directions. `None` when a value is not finite.
 /// ```
 /// # use goniofit::radiometry::*;

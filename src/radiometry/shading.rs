@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// Phong's equation r_a I_a + r_d I_d max(0, n·s) + r_s I_s max(0, r·b)^α with s to the light, b to the eye and
+/// Phong's equation `r_a I_a + r_d I_d max(0, n·s) + r_s I_s max(0, r·b)^α` with s to the light, b to the eye and
 /// r = 2(n·s)n − s the mirror image of s about the normal n.
 ///
 /// It is a rule for shading, not a BRDF: its numbers have no unit, nothing falls with 1/r², the highlight is not normalised
@@ -24,11 +24,11 @@ use glam::DVec3;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhongShading {
-    /// Share r_a of the ambient light.
+    /// Share `r_a` of the ambient light.
     pub ambient: f64,
-    /// Share r_d of the diffuse term.
+    /// Share `r_d` of the diffuse term.
     pub diffuse: f64,
-    /// Share r_s of the highlight.
+    /// Share `r_s` of the highlight.
     pub specular: f64,
     /// The highlight's exponent α ≥ 0.
     pub exponent: f64,

@@ -81,7 +81,7 @@ pub fn radiance_from_point(rho: BrdfValue, intensity: Intensity, cos_i: f64, dis
     (rho * irradiance_tilted(intensity, cos_i, distance)?).finite()
 }
 
-/// Example 2: radiance ∫ ρ(θi, θo) L_in(θi) cosθi dθi along θo under an extended source. `None` when a value is not finite.
+/// Example 2: radiance `∫ ρ(θi, θo) L_in(θi) cosθi dθi` along θo under an extended source. `None` when a value is not finite.
 /// ```
 /// # use goniofit::radiometry::*;
 /// // ρ = cos²(θi − θo) under an even sky: 1 + cos(2θo)/3.
@@ -114,7 +114,7 @@ pub fn diffuse_brdf(albedo: f64) -> BrdfValue {
     BrdfValue::new(0.5 * albedo)
 }
 
-/// Example 4: radiance (albedo/2) ∫ L_in cosθi dθi of a diffuse surface under an extended source. `None` when a value is not
+/// Example 4: radiance `(albedo/2) ∫ L_in cosθi dθi` of a diffuse surface under an extended source. `None` when a value is not
 /// finite.
 /// ```
 /// # use goniofit::radiometry::*;

@@ -104,8 +104,8 @@ pub struct PointSource<F> {
     pub intensity: F,
 }
 
-/// Irradiance H(p) = Σ I_k · max(0, n·(e_k − p))/|e_k − p|² of the point `p` (m) with normal `n`, of any length, from point
-/// sources at e_k. `None` when `p` is on a source, `n` is 0, or something is not finite.
+/// Irradiance `H(p) = Σ I_k · max(0, n·(e_k − p))/|e_k − p|²` of the point `p` (m) with normal `n`, of any length, from point
+/// sources at `e_k`. `None` when `p` is on a source, `n` is 0, or something is not finite.
 /// ```
 /// # use goniofit::radiometry::*;
 /// use glam::DVec2;
