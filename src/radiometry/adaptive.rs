@@ -285,6 +285,7 @@ fn split<const N: usize>(low: [f64; N], high: [f64; N], parts: usize) -> impl It
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // exact results are compared exactly
 mod tests {
     use super::*;
     use crate::numeric::random::{Purpose, RngExt, stream};

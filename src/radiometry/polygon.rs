@@ -183,6 +183,7 @@ fn triangle_by_area(apex: &Vertex, a: &Vertex, b: &Vertex) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // exact results are compared exactly
 mod tests {
     use super::*;
     use crate::geometry::direction;

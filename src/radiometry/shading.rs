@@ -52,6 +52,7 @@ impl PhongShading {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // exact results are compared exactly
 mod tests {
     use super::*;
     use crate::geometry::{direction, mirror};

@@ -72,6 +72,7 @@ impl std::ops::Div<Irradiance> for Exitance {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // exact results are compared exactly
 mod tests {
     use super::*;
 

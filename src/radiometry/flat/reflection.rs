@@ -205,6 +205,7 @@ fn angle_from(normal: DVec2, w: DVec2) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // exact results are compared exactly
 mod tests {
     use super::*;
     use crate::radiometry::flat::phong2d;
