@@ -13,3 +13,4 @@ pub mod image;
 pub mod measurement;
 pub mod numeric;
 pub mod render;
+pub mod radiometry;
