@@ -1,5 +1,7 @@
 //! Laws of the tracer: radiometry against closed forms, and what must not change the picture.
 
+#![allow(clippy::expect_used, clippy::panic, clippy::float_cmp)] // these are tests
+
 mod common;
 
 use std::f64::consts::PI;

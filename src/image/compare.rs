@@ -33,7 +33,7 @@ pub struct Comparison {
     pub significance: Option<Significance>,
 }
 
-/// A test of every pixel and channel: z = (x − ref)/√(σ² + σ_ref²), a picture without standard errors counting as exact. Half a unit
+/// A test of every pixel and channel: z = (x − ref)/√(σ² + σref²), a picture without standard errors counting as exact. Half a unit
 /// in the last place of the 32-bit floats of a file counts as noise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Significance {
@@ -105,7 +105,7 @@ fn significance(image: &Image, reference: &Image, known: &[usize]) -> Option<Sig
                 continue; // a single sample: its noise is not known
             }
             let rounding = 0.5 * f64::from(f32::EPSILON) * x.abs().max(r.abs());
-            let z = if x == r { 0.0 } else { (x - r).abs() / noise.hypot(rounding) };
+            let z = if (x - r).abs() == 0.0 { 0.0 } else { (x - r).abs() / noise.hypot(rounding) };
             tests += 1;
             sum += z * z;
             if z > max_z || z.is_nan() {

@@ -134,3 +134,70 @@ fn rgb(list: &[Channel], prefix: &str) -> Option<Vec<[f64; 3]>> {
     }
     Some(named("Y")?.into_iter().map(|y| [y; 3]).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Image {
+        let values = |k: usize| (0..12).map(|i| std::array::from_fn(|c| 0.25 * (i * 3 + c + k) as f64)).collect();
+        Image {
+            width: 4,
+            height: 3,
+            radiance: values(0),
+            standard_error: Some(values(100)),
+            mask: Some((0..12).map(|i| f64::from(i) / 16.0).collect()),
+            metadata: Metadata {
+                scene: Some("cornell".into()),
+                seed: Some(u64::MAX),
+                samples: Some(64),
+                seconds: Some(0.1),
+                program: Some("goniofit 0.1.0".into()),
+            },
+        }
+    }
+
+    #[test]
+    fn files_come_back_with_all_layers_and_metadata() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let full = example();
+        let bare = Image { standard_error: None, mask: None, metadata: Metadata::default(), ..full.clone() };
+        for image in [full, bare] {
+            write_exr(&path, &image).unwrap();
+            assert_eq!(read_exr(&path).unwrap(), image);
+        }
+    }
+
+    #[test]
+    fn extreme_values_and_nan_are_written_as_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let mut image = example();
+        image.radiance[0] = [f64::from(1e-20f32), f64::from(1e20f32), f64::INFINITY];
+        image.radiance[1][0] = f64::NAN;
+        write_exr(&path, &image).unwrap();
+        let back = read_exr(&path).unwrap();
+        assert!(back.radiance[0].iter().zip(&image.radiance[0]).all(|(a, b)| a.to_bits() == b.to_bits()));
+        assert!(back.radiance[1][0].is_nan());
+    }
+
+    #[test]
+    fn broken_files_are_named_and_a_failed_write_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        write_exr(&path, &example()).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        for length in [0, 3, 100, bytes.len() / 2, bytes.len() - 1] {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            let error = read_exr(&path).unwrap_err();
+            assert!(matches!(error, ImageError::Invalid { .. }) && error.to_string().contains("a.exr"), "{error}");
+        }
+        assert!(matches!(read_exr(&folder.path().join("none.exr")), Err(ImageError::Io { .. })));
+        let mut wrong = example();
+        wrong.radiance.pop();
+        let target = folder.path().join("b.exr");
+        assert!(matches!(write_exr(&target, &wrong), Err(ImageError::Layer { layer: "radiance", found: 11, .. })));
+        assert!(!target.exists());
+    }
+}

@@ -100,10 +100,9 @@ impl Sheet {
     }
 
     fn below_height(&self) -> usize {
-        let caption = if self.tiles.iter().any(|t| !t.caption.is_empty()) { SMALL_SIZE as usize + 10 } else { 0 };
-        let scale =
-            if self.tiles.iter().any(|t| t.scale.is_some()) { BAR_HEIGHT + SMALL_SIZE as usize + 18 } else { 0 };
-        caption + scale
+        let caption = |t: &Tile| if t.caption.is_empty() { 0 } else { SMALL_SIZE as usize + 10 };
+        let scale = |t: &Tile| if t.scale.is_some() { BAR_HEIGHT + SMALL_SIZE as usize + 18 } else { 0 };
+        self.tiles.iter().map(|t| caption(t) + scale(t)).max().unwrap_or(0)
     }
 }
 

@@ -32,7 +32,7 @@ impl std::fmt::Debug for Material {
     }
 }
 
-/// Phong's equation L = r_a I_a + Σ (r_d I_d max(0, n·s) + r_s I_s max(0, r·b)^α) over the lights that the point sees, with s the
+/// Phong's equation `L = r_a I_a + Σ (r_d I_d max(0, n·s) + r_s I_s max(0, r·b)^α)` over the lights that the point sees, with s the
 /// direction to the light, b to the eye and r the mirror image of s about the normal n (Phong 1975).
 ///
 /// It is a rule for shading, not a BRDF: a light's distance, size and power don't enter (no 1/r²; the products r I are the
@@ -40,11 +40,11 @@ impl std::fmt::Debug for Material {
 /// shines on either side of it; a constant environment is the ambient term's business. A light below the horizon is not seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhongEquation {
-    /// r_a I_a, radiance per channel.
+    /// `r_a I_a`, radiance per channel.
     pub ambient: DVec3,
-    /// r_d I_d, radiance per channel.
+    /// `r_d I_d`, radiance per channel.
     pub diffuse: DVec3,
-    /// r_s I_s, radiance per channel.
+    /// `r_s I_s`, radiance per channel.
     pub specular: DVec3,
     /// α, at least 0.
     pub alpha: f64,

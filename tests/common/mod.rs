@@ -1,5 +1,6 @@
 //! What the tests of the tracer share.
 #![allow(dead_code)] // each test file uses its part
+#![allow(clippy::expect_used, clippy::panic, clippy::float_cmp)] // these are tests
 
 use std::path::Path;
 

@@ -10,6 +10,7 @@ use super::ray::{Ray, SurfacePoint};
 
 /// A light other than the environment.
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant)] // a scene has few lights, and the quad is the one that is asked most
 pub enum Light {
     /// Radiant intensity (W/sr) from a point.
     Point {

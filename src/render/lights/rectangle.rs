@@ -150,3 +150,69 @@ impl RectangleView {
         (x, y.clamp(self.low.y, self.high.y))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::random::{Purpose, RngExt, stream};
+    use crate::numeric::stats::chi_square_test;
+
+    /// Solid angle of a triangle seen from the origin (van Oosterom, Strackee 1983).
+    fn triangle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+        let (a, b, c) = (a.normalize(), b.normalize(), c.normalize());
+        2.0 * a.dot(b.cross(c)).abs().atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
+    }
+
+    /// Solid angle of the part a in [a0, a1], b in [b0, b1] of the quad, seen from p.
+    fn part(quad: &Quad, p: DVec3, a: (f64, f64), b: (f64, f64)) -> f64 {
+        let at = |a, b| quad.surface(a, b).position - p;
+        triangle(at(a.0, b.0), at(a.1, b.0), at(a.1, b.1)) + triangle(at(a.0, b.0), at(a.1, b.1), at(a.0, b.1))
+    }
+
+    #[test]
+    fn points_are_uniform_in_solid_angle() {
+        let quad = Quad::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.0, 0.0, 2.0));
+        // Across from the middle, beside it, close to it, close to a corner, low over an edge, far away.
+        let above = |a: f64, b: f64, h: f64| quad.center + a * quad.u + b * quad.v + h * quad.normal;
+        for p in [
+            above(0.0, 0.0, 1.0),
+            above(2.0, 0.5, 0.7),
+            above(0.1, 0.2, 0.01),
+            above(1.0, -1.0, 0.05),
+            above(0.0, 1.5, 0.02),
+            above(3.0, 1.0, 60.0),
+        ] {
+            let light = QuadLight::new(quad, DVec3::ONE);
+            let view = light.seen_from(p).expect("above 1e-5 sr");
+            let whole = part(&quad, p, (-1.0, 1.0), (-1.0, 1.0));
+            assert!((view.solid_angle / whole - 1.0).abs() < 1e-9, "{p}: {} vs {whole}", view.solid_angle);
+            let draws = 40_000;
+            let mut rng = stream(3, Purpose::Study, 0);
+            let mut counts = [0.0; 64];
+            for _ in 0..draws {
+                let (a, b) = view.sample(DVec2::new(rng.random(), rng.random()));
+                let cell = |x: f64| ((4.0 * (x + 1.0)) as usize).min(7);
+                counts[8 * cell(b) + cell(a)] += 1.0;
+            }
+            let edge = |i: usize| (0.25 * i as f64 - 1.0, 0.25 * i as f64 - 0.75);
+            let share = |i: usize| part(&quad, p, edge(i % 8), edge(i / 8)) / whole;
+            let expected: Vec<f64> = (0..64).map(|i| f64::from(draws) * share(i)).collect();
+            let (chi2, freedom, chance) = chi_square_test(&counts, &expected);
+            assert!(chance > 1e-3, "{p}: chi2 {chi2} of {freedom}, p {chance}");
+        }
+    }
+
+    #[test]
+    fn the_two_samplings_meet_where_the_light_is_small() {
+        let quad = Quad::new(DVec3::ZERO, DVec3::X, DVec3::Y);
+        let light = QuadLight::new(quad, DVec3::ONE);
+        for distance in [632.0, 632.9] {
+            // 4 m² at 632.46 m are 10⁻⁵ sr; the densities differ by no more than (half diagonal / distance)² there.
+            let p = DVec3::new(0.0, 0.0, distance);
+            let density = light.pdf(p, DVec3::ZERO);
+            assert!((density * 4.0 / (distance * distance) - 1.0).abs() < 2.0 * 2.0 / distance.powi(2), "{distance}");
+        }
+        assert!(light.seen_from(DVec3::new(0.0, 0.0, 632.0)).is_some());
+        assert!(light.seen_from(DVec3::new(0.0, 0.0, 632.9)).is_none());
+    }
+}

@@ -117,11 +117,11 @@ pub struct PhongLobeSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EquationSpec {
-    /// r_a I_a, radiance, at least 0.
+    /// `r_a I_a`, radiance, at least 0.
     pub ambient: [f64; 3],
-    /// r_d I_d, radiance, at least 0.
+    /// `r_d I_d`, radiance, at least 0.
     pub diffuse: [f64; 3],
-    /// r_s I_s, radiance, at least 0.
+    /// `r_s I_s`, radiance, at least 0.
     pub specular: [f64; 3],
     /// α, at least 0.
     pub alpha: f64,

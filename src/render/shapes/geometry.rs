@@ -157,3 +157,93 @@ impl Triangles {
         self.bvh.traverse(ray, true, |i, t_max| Some(sheared.hit(&self.corners[i], t_max)?.0)).is_some()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::geometry::sampling::uniform_sphere;
+    use crate::numeric::random::{Purpose, RngExt, Stream, stream};
+
+    fn point(rng: &mut Stream) -> DVec3 {
+        DVec3::new(rng.random(), rng.random(), rng.random()) - 0.5
+    }
+
+    #[test]
+    fn the_hierarchy_finds_what_a_search_of_all_triangles_finds() {
+        let mut rng = stream(1, Purpose::Study, 0);
+        for (scale, center) in [(1.0, DVec3::ZERO), (1e-4, DVec3::splat(0.3)), (1e6, DVec3::new(1e7, 0.0, 0.0))] {
+            // Small triangles, and needles that run across the whole.
+            let triangles: Vec<[DVec3; 3]> = (0..600)
+                .map(|i| {
+                    let (a, b) = (point(&mut rng), point(&mut rng));
+                    let c = if i % 10 == 0 { a + 1e-9 * point(&mut rng) } else { a + 0.3 * point(&mut rng) };
+                    let b = if i % 10 == 0 { b } else { a + 0.3 * b };
+                    [a, b, c].map(|p| center + scale * p)
+                })
+                .collect();
+            let mesh = Mesh { triangles: triangles.clone(), normals: Vec::new() };
+            let geometry = Geometry::new(vec![], vec![], vec![], vec![(mesh, Owner::Material(0))]);
+            let mut met = 0;
+            for i in 0..4000 {
+                let direction = uniform_sphere(DVec2::new(rng.random(), rng.random()));
+                let origin = if i % 4 == 0 { -1e3 * direction + 0.3 * point(&mut rng) } else { 2.0 * point(&mut rng) };
+                let t_max = if i % 3 == 0 { scale } else { f64::INFINITY };
+                let ray = Ray { origin: center + scale * origin, direction, t_max };
+                let sheared = ShearedRay::new(&ray);
+                let want = triangles.iter().filter_map(|c| sheared.hit(c, t_max)).map(|h| h.0).min_by(f64::total_cmp);
+                let found = geometry.triangles.as_ref().and_then(|mesh| mesh.closest(&ray)).map(|h| h.0);
+                assert!(found == want, "ray {i} at scale {scale:e}: {found:?} vs {want:?}");
+                assert_eq!(geometry.occluded(&ray), want.is_some());
+                met += usize::from(want.is_some());
+            }
+            assert!((500..3500).contains(&met), "{met} rays met a triangle");
+        }
+    }
+
+    #[test]
+    fn a_small_distant_sphere_is_met_where_it_is() {
+        for (radius, distance) in [(1.0, 4.0), (1e-6, 1e3), (1e3, 1e-6), (1e-4, 1e7)] {
+            let sphere = Sphere { center: DVec3::new(0.0, 0.0, -distance - radius), radius };
+            for (offset, met) in [(0.0, true), (0.999, true), (1.001, false)] {
+                let ray = Ray::new(DVec3::new(offset * radius, 0.0, 0.0), -DVec3::Z);
+                let hit = sphere.hit(&ray, f64::INFINITY);
+                assert_eq!(hit.is_some(), met, "radius {radius:e}, distance {distance:e}, offset {offset}");
+                let want = distance + radius * (1.0 - f64::sqrt(1.0 - offset * offset));
+                // The coordinates themselves are rounded.
+                let bound = 8.0 * f64::EPSILON * (distance + radius) / f64::sqrt(1.0 - offset * offset).max(0.04);
+                assert!(hit.is_none_or(|t| (t - want).abs() <= bound), "{hit:?} vs {want} ± {bound:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn rays_that_leave_a_surface_do_not_find_it_again() {
+        let mut rng = stream(2, Purpose::Study, 0);
+        for scale in [1e-6, 1.0, 1e9] {
+            for center in [DVec3::ZERO, DVec3::new(3.0, -2.0, 1e3)] {
+                let sphere = Sphere { center: scale * center, radius: scale };
+                let quad = Quad::new(scale * center, scale * point(&mut rng), scale * point(&mut rng));
+                for _ in 0..2000 {
+                    let normal = uniform_sphere(DVec2::new(rng.random(), rng.random()));
+                    let on_sphere = sphere.surface(sphere.center + scale * normal);
+                    let on_quad = quad.surface(rng.random(), rng.random());
+                    for at in [on_sphere, on_quad] {
+                        // Grazing directions too.
+                        let w = uniform_sphere(DVec2::new(rng.random(), rng.random()));
+                        let flat = w - (1.0 - 1e-9) * w.dot(at.normal) * at.normal;
+                        for d in [w, flat.normalize()] {
+                            let d = if d.dot(at.normal) < 0.0 { d - 2.0 * d.dot(at.normal) * at.normal } else { d };
+                            let ray = Ray::new(at.above(), d.normalize());
+                            let again = sphere.hit(&ray, f64::INFINITY).filter(|_| at.normal != quad.normal);
+                            assert!(again.is_none(), "sphere at {center} x {scale:e}: {again:?}");
+                            let again = quad.hit(&ray, f64::INFINITY).filter(|_| at.normal == quad.normal);
+                            assert!(again.is_none(), "quad at {center} x {scale:e}: {again:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
