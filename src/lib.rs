@@ -12,5 +12,5 @@ pub mod gonio;
 pub mod image;
 pub mod measurement;
 pub mod numeric;
-pub mod render;
 pub mod radiometry;
+pub mod render;

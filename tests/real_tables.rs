@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use goniofit::fit::{FitOptions, fit};
-use goniofit::measurement::{Format, MerlGrid, MerlAngles, ReadOptions, formats};
+use goniofit::measurement::{Format, MerlAngles, MerlGrid, ReadOptions, formats};
 use rayon::prelude::*;
 
 fn shared(path: &str) -> Option<PathBuf> {
@@ -90,7 +90,8 @@ fn decode(path: &Path) -> Vec<u8> {
 
 #[test]
 fn all_16_tables_reach_the_optimum_found_by_brute_force_from_no_start_value() {
-    let (Some(folder), Some(reference)) = (shared("data/merl-encoded"), shared("reference/merl_lambert_phong.json")) else {
+    let (Some(folder), Some(reference)) = (shared("data/merl-encoded"), shared("reference/merl_lambert_phong.json"))
+    else {
         return;
     };
     let reference: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(reference).unwrap()).unwrap();
@@ -100,7 +101,8 @@ fn all_16_tables_reach_the_optimum_found_by_brute_force_from_no_start_value() {
     assert_eq!(files.len(), 16);
     for file in files {
         let name = file.file_stem().unwrap().to_string_lossy().into_owned();
-        let table = formats::read_bytes(&file.with_extension("binary"), decode(&file), &ReadOptions::default()).unwrap();
+        let table =
+            formats::read_bytes(&file.with_extension("binary"), decode(&file), &ReadOptions::default()).unwrap();
         let run = |model: &str| fit(&table, &FitOptions::new(model.parse().unwrap())).unwrap().material;
         let (lambert, both) = (run("lambert"), run("lambert+phong"));
         let want = |key: &str| reference[&name][key].as_f64().unwrap();

@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::lobe::{Lobe, Octaves, Parameter, above_horizon, ln_cos_alpha, octave};
 use crate::numeric::quadrature::integrate;
+use crate::radiometry::flat::phong2d_normalisation;
 
 /// The exponent n; the fit searches this range.
 const EXPONENT: [Parameter; 1] = [Parameter { name: "exponent", unit: "1", bounds: (0.01, 1e8) }];
@@ -101,25 +102,23 @@ fn octaves(low: f64, count: usize, coordinates: &[f64], norm: impl Fn(f64) -> (f
     (0..count).map(lobe).unzip()
 }
 
-/// c(n) = Γ((n+3)/2)/(√π·Γ((n+2)/2)), which makes ∫ c cosⁿα cosα dα = 1 over [−π/2, π/2], and its derivative.
+/// c(n) = Γ((n+3)/2)/(√π·Γ((n+2)/2)), which makes ∫ c cosⁿα cosα dα = 1 over [−π/2, π/2], and its derivative by n, c/2 times the
+/// difference of two digammas.
 fn flat_normalization(n: f64) -> (f64, f64) {
+    let value = phong2d_normalisation(n).unwrap_or(f64::NAN);
     let x = 0.5 * (n + 2.0);
-    if x > 30.0 {
-        // Γ(x + ½)/Γ(x) = √x (1 − 1/8x + 1/128x² + 5/1024x³ − 21/32768x⁴ − 399/262144x⁵ + …), Tricomi & Erdélyi 1951
-        let y = 1.0 / x;
-        let series =
-            [1.0, -1.0 / 8.0, 1.0 / 128.0, 5.0 / 1024.0, -21.0 / 32768.0, -399.0 / 262_144.0, 869.0 / 4_194_304.0];
-        let (mut s, mut ds) = (0.0, 0.0);
-        for (k, c) in series.iter().enumerate().rev() {
-            s = s * y + c;
-            ds += -(k as f64) * c * y.powi(k as i32 + 1);
-        }
-        let root = (x / PI).sqrt();
-        return (root * s, 0.5 * (root * 0.5 * y * s + root * ds));
+    (value, 0.5 * value * digamma_half_step(x))
+}
+
+/// ψ(x + ½) − ψ(x) for x ≥ 1, by its recurrence and, for large x, the derivative of the series of ln Γ(x + ½)/Γ(x).
+fn digamma_half_step(mut x: f64) -> f64 {
+    let mut sum = 0.0;
+    while x < 24.0 {
+        sum += 0.5 / (x * (x + 0.5)); // 1/x − 1/(x + ½)
+        x += 1.0;
     }
-    let (ln, digamma) = (statrs::function::gamma::ln_gamma, statrs::function::gamma::digamma);
-    let value = (ln(x + 0.5) - ln(x)).exp() / PI.sqrt();
-    (value, 0.5 * value * (digamma(x + 0.5) - digamma(x)))
+    let y = 1.0 / (x * x);
+    sum + 0.5 / x + y * (1.0 / 8.0 - y * (1.0 / 64.0 - y * (1.0 / 128.0 - y * (17.0 / 2048.0))))
 }
 
 /// Density (1/sr) of the directions that [`crate::geometry::sampling::cosine_power`] draws about the mirror direction.
@@ -142,32 +141,40 @@ pub fn directional_albedo(exponent: f64, theta: f64) -> f64 {
     whole + clipped_rings(n, theta)
 }
 
+/// The rings from α₀ = π/2 − θ to π/2, in β = α − α₀ from 0 to θ. Panels double in width away from α₀, where the integrand bends
+/// at every scale, and halve towards π/2, where cosⁿα has a root's end for small n.
 fn clipped_rings(n: f64, theta: f64) -> f64 {
     let (sin_t, cos_t) = theta.sin_cos();
-    let start = FRAC_PI_2 - theta;
-    let end = negligible_beyond(n);
-    if sin_t <= 0.0 || end <= start {
+    let total = (negligible_beyond(n) - (FRAC_PI_2 - theta)).min(theta);
+    if sin_t <= 0.0 || total <= 0.0 {
         return 0.0;
     }
-    let ring = |beyond: f64| {
-        // α = start + beyond; −cos(θ + α) = sin(beyond)
-        let (sin_a, cos_a) = (start + beyond).sin_cos();
-        let cos_psi = -cos_t * cos_a;
-        let sin_psi = (beyond.sin() * (theta - start - beyond).cos()).max(0.0).sqrt();
-        let psi = sin_psi.atan2(cos_psi);
-        // sinψ was scaled by sinθ sinα: the ring is 2 [ψ cosθ cosα + sinθ sinα sinψ]
-        2.0 * (psi * cos_t * cos_a + sin_psi) * sin_a * power(n, cos_a.max(0.0).ln())
+    // A clipped ring is 2 [ψ cosθ cosα + sinθ sinα sinψ], with cosψ and sinψ both times sinθ sinα here.
+    let ring = |beta: f64, left: f64| {
+        let (cos_a, sin_a) = left.sin_cos();
+        let (cos_psi, sin_psi) = (-cos_t * cos_a, (beta.sin() * (theta + left).sin()).max(0.0).sqrt());
+        2.0 * (sin_psi.atan2(cos_psi) * cos_t * cos_a + sin_psi) * sin_a * power(n, cos_a.max(0.0).ln())
     };
-    let total = end - start;
-    let mut width = (0.25 * start).min(0.25 * total).min(1.0 / (n + 1.0).sqrt()).max(1e-14 * total);
-    // First panel in √beyond, where sinψ starts like a root; then panels that double.
-    let mut sum = integrate(0.0, width.sqrt(), 24, |s| 2.0 * s * ring(s * s));
-    let mut low = width;
-    while low < total {
-        let high = (low + width).min(total);
-        sum += integrate(low, high, 24, ring);
+    let spread = 1.0 / (n + 1.0).sqrt();
+    let middle = 0.5 * total;
+    let first = (0.25 * (FRAC_PI_2 - theta)).min(0.25 * total).min(spread).max(1e-14 * total);
+    // The first panel in √β, where sinψ starts like a root.
+    let mut sum = integrate(0.0, first.sqrt(), 24, |s| 2.0 * s * ring(s * s, theta - s * s));
+    let (mut low, mut width) = (first, first);
+    while low < middle {
+        let high = (low + width).min(middle);
+        sum += integrate(low, high, 24, |beta| ring(beta, theta - beta));
         low = high;
-        width = (2.0 * width).min(2.0 / (n + 1.0).sqrt());
+        width = (2.0 * width).min(2.0 * spread);
+    }
+    // The second half from its far end, where `left` = π/2 − α starts at 0 or where the lobe is negligible.
+    let nearest = theta - total;
+    let (mut near, mut width) = (0.0, 1e-14 * total);
+    while near < total - low {
+        let far = (near + width).min(total - low);
+        sum += integrate(near, far, 24, |left| ring(total - left, nearest + left));
+        near = far;
+        width = (2.0 * near).min(2.0 * spread);
     }
     (n + 2.0) / TAU * sum
 }
