@@ -200,10 +200,10 @@ impl Reflectance {
         Self::new(albedo, Vec::new())
     }
 
-    /// Lambert plus one Phong lobe, weights per channel.
+    /// A Lambert lobe and any number of Phong lobes (weights, exponent ≥ 0), one weight a channel.
     #[must_use]
-    pub fn lambert_phong(kd: Vec<f64>, ks: Vec<f64>, exponent: f64) -> Self {
-        Self::new(kd, vec![GlossyTerm { weight: ks, exponent }])
+    pub fn lobes(diffuse: Vec<f64>, phong: impl IntoIterator<Item = (Vec<f64>, f64)>) -> Self {
+        Self::new(diffuse, phong.into_iter().map(|(weight, exponent)| GlossyTerm { weight, exponent }).collect())
     }
 
     /// Directional albedo of each channel for light to or from `w`.
@@ -289,9 +289,9 @@ mod tests {
         );
         vec![
             ("lambert", Reflectance::lambert(vec![0.7])),
-            ("phong 0", Reflectance::lambert_phong(vec![0.0], vec![1.0], 0.0)),
-            ("phong 30", Reflectance::lambert_phong(vec![0.0], vec![1.0], 30.0)),
-            ("lambert + phong 200", Reflectance::lambert_phong(vec![0.3], vec![0.6], 200.0)),
+            ("phong 0", Reflectance::lobes(vec![0.0], [(vec![1.0], 0.0)])),
+            ("phong 30", Reflectance::lobes(vec![0.0], [(vec![1.0], 30.0)])),
+            ("lambert + phong 200", Reflectance::lobes(vec![0.3], [(vec![0.6], 200.0)])),
             ("two lobes", two.reflectance(&[0]).expect("in space")),
         ]
     }

@@ -6,7 +6,6 @@
 //! shapes, so a fit searches the shapes alone.
 
 pub mod check;
-pub mod classic;
 pub mod file;
 pub mod lambert;
 pub mod lobe;
@@ -14,7 +13,6 @@ pub mod material;
 pub mod phong;
 pub mod spec;
 
-pub use classic::PhongEquation;
 pub use file::{FitRecord, LobeRecord, MaterialError};
 pub use lobe::{Lobe, LobeKind, Octaves, Parameter};
 pub use material::{LobeTerm, Material, PerChannel, Reflectance};

@@ -4,7 +4,7 @@
 //! f = weight·(n + 2)/(2π)·(r·wo)ⁿ where r·wo > 0, r the mirror image of wi about the normal, else 0, for n = 0 too.
 //! Its directional albedo falls towards grazing, to weight·cosθ for large n, because part of the lobe sinks below the horizon.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec3;
 
@@ -190,6 +190,7 @@ mod tests {
     use super::*;
     use crate::geometry::direction;
     use crate::numeric::quadrature::integrate_directions;
+    use std::f64::consts::PI;
 
     fn phong(n: f64, wi: DVec3, wo: DVec3) -> f64 {
         Phong.value(&[n], Phong.coordinate(wi, wo), &mut [0.0])

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::demo::write_bytes;
 use super::error::ChainError;
 use crate::image::sheet::{Scale, Sheet, Tile};
 use crate::image::{
-    Bitmap, ColorMap, Comparison, Image, compare, develop, difference_map, exposure_for, write_exr, write_png,
+    Bitmap, ColorMap, Comparison, Image, compare, develop, difference_map, encode_exr, encode_png, exposure_for,
 };
 
 /// A picture with its name, in file names and above the picture.
@@ -62,9 +63,9 @@ pub fn write_gallery(
 ) -> Result<Gallery, ChainError> {
     let exposure = exposure_for(&reference.image);
     let preview = |shown: &Shown| -> Result<Bitmap, ChainError> {
-        write_exr(&folder.join(format!("{}.exr", shown.file)), &shown.image)?;
+        write_bytes(&folder.join(format!("{}.exr", shown.file)), &encode_exr(&shown.image)?)?;
         let bitmap = develop(&shown.image, exposure);
-        write_png(&folder.join(format!("{}.png", shown.file)), &bitmap)?;
+        write_bytes(&folder.join(format!("{}.png", shown.file)), &encode_png(&bitmap)?)?;
         Ok(bitmap)
     };
     let mut range = 0.0f64;
@@ -78,9 +79,9 @@ pub fn write_gallery(
     for (shown, comparison) in others.iter().zip(&comparisons) {
         pictures.push(tile(preview(shown)?, &shown.label, String::new()));
         let name = &shown.difference_file;
-        write_exr(&folder.join(format!("{name}.exr")), &difference(&shown.image, &reference.image))?;
+        write_bytes(&folder.join(format!("{name}.exr")), &encode_exr(&difference(&shown.image, &reference.image))?)?;
         let map = difference_map(&shown.image, &reference.image, Some(range))?;
-        write_png(&folder.join(format!("{name}.png")), &map.bitmap)?;
+        write_bytes(&folder.join(format!("{name}.png")), &encode_png(&map.bitmap)?)?;
         let caption = format!("rmse {:.2e}   relMSE {:.2e}", comparison.rmse, comparison.rel_mse);
         let unit = "W/(sr m²)".to_owned();
         let scale = Scale { map: ColorMap::Diverging, low: -map.range, high: map.range, unit };
@@ -90,7 +91,7 @@ pub fn write_gallery(
     let columns = pictures.len();
     let tiles = pictures.into_iter().chain(maps).collect();
     let sheet = Sheet { title: title.into(), subtitle: subtitle.into(), columns, tiles };
-    write_png(&folder.join("sheet.png"), &sheet.draw()?)?;
+    write_bytes(&folder.join("sheet.png"), &encode_png(&sheet.draw()?)?)?;
     Ok(Gallery { comparisons, exposure })
 }
 

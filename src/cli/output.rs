@@ -10,12 +10,17 @@ use crate::measurement::{Format, Measurement, MeasurementError, formats};
 
 /// Writes a text file whole, or to stdout for `-` (where a closed pipe is no error).
 pub(super) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    write_bytes(path, text.as_bytes())
+}
+
+/// Writes a file whole, or to stdout for `-`.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if path == Path::new("-") {
         let mut out = io::stdout().lock();
-        return closed_pipe_is_fine(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+        return closed_pipe_is_fine(out.write_all(bytes).and_then(|()| out.flush()))
             .map_err(|e| Failure::output(path, &e));
     }
-    write_whole::<_, io::Error>(path, |w| w.write_all(text.as_bytes())).map_err(|e| Failure::output(path, &e))
+    write_whole::<_, io::Error>(path, |w| w.write_all(bytes)).map_err(|e| Failure::output(path, &e))
 }
 
 fn closed_pipe_is_fine(result: io::Result<()>) -> io::Result<()> {

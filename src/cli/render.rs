@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
+use super::output::write_bytes;
 use super::ui::{self, Ui};
 use crate::chain::{self, Stage};
-use crate::image::{Image, develop, exposure_for, write_exr, write_png};
+use crate::image::{Image, develop, encode_exr, encode_png, exposure_for};
 use crate::render::Options;
 
 #[derive(Debug, clap::Args)]
@@ -93,10 +94,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         Some(name) => chain::picture_of(name, args.picture.rgb.as_ref(), &stage, &options, ui.control())?,
         None => chain::picture(&stage, None, &options, ui.control())?,
     };
-    write_exr(&args.out, &image).map_err(|e| Failure::work(e.to_string()))?;
+    write_bytes(&args.out, &encode_exr(&image)?)?;
     if let Some(png) = &args.png {
         let exposure = args.exposure.unwrap_or_else(|| exposure_for(&image));
-        write_png(png, &develop(&image, exposure)).map_err(|e| Failure::work(e.to_string()))?;
+        write_bytes(png, &encode_png(&develop(&image, exposure))?)?;
     }
     if ui::stop().requested() {
         ui.warn("stopped: the picture has fewer samples than asked for");

@@ -1,8 +1,6 @@
 //! 8-bit pictures and PNG files.
 
-use std::path::Path;
-
-use super::{ImageError, write_whole};
+use super::ImageError;
 
 /// An 8-bit sRGB picture. Pixels run along rows, row 0 on top.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,25 +47,25 @@ impl Bitmap {
     }
 }
 
-/// Writes an 8-bit PNG file marked as sRGB. The file appears whole or not at all.
+/// The bytes of an 8-bit PNG file marked as sRGB.
 ///
 /// # Errors
-/// [`ImageError::Io`] where the disk refuses, [`ImageError::Layer`] where the pixels do not fit the size.
-pub fn write_png(path: &Path, bitmap: &Bitmap) -> Result<(), ImageError> {
+/// [`ImageError::Layer`] where the pixels do not fit the size, [`ImageError::Encode`] where the encoder refuses.
+pub fn encode_png(bitmap: &Bitmap) -> Result<Vec<u8>, ImageError> {
     let (width, height, found) = (bitmap.width, bitmap.height, bitmap.pixels.len());
     if found != width * height {
         return Err(ImageError::Layer { layer: "pixels", width, height, found });
     }
+    let refused = |e: png::EncodingError| ImageError::Encode { format: "PNG", reason: e.to_string() };
     let mut bytes = Vec::new();
-    let io = |e: png::EncodingError| ImageError::Io { path: path.into(), source: std::io::Error::other(e.to_string()) };
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    let mut writer = encoder.write_header().map_err(io)?;
-    writer.write_image_data(bitmap.pixels.as_flattened()).map_err(io)?;
-    writer.finish().map_err(io)?;
-    write_whole(path, &bytes)
+    let mut writer = encoder.write_header().map_err(refused)?;
+    writer.write_image_data(bitmap.pixels.as_flattened()).map_err(refused)?;
+    writer.finish().map_err(refused)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]
@@ -85,17 +83,15 @@ mod tests {
 
     #[test]
     fn png_files_come_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.png");
         let mut bitmap = Bitmap::filled(7, 5, [1, 2, 3]);
         *bitmap.pixel_mut(6, 4).unwrap() = [200, 100, 50];
-        write_png(&path, &bitmap).unwrap();
-        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
-        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let file = encode_png(&bitmap).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
         let mut bytes = vec![0; 7 * 5 * 3];
         reader.next_frame(&mut bytes).unwrap();
         assert_eq!(bytes, bitmap.pixels.as_flattened());
         assert!(reader.info().srgb.is_some());
-        assert!(matches!(write_png(&folder.path().join("none/a.png"), &bitmap), Err(ImageError::Io { .. })));
+        bitmap.pixels.pop();
+        assert!(matches!(encode_png(&bitmap), Err(ImageError::Layer { found: 34, .. })));
     }
 }

@@ -55,6 +55,14 @@ pub enum ImageError {
         /// Pixels in the layer.
         found: usize,
     },
+    /// An encoder failed.
+    #[error("the picture can't be encoded as {format}: {reason}")]
+    Encode {
+        /// The format.
+        format: &'static str,
+        /// What the encoder said.
+        reason: String,
+    },
     /// The embedded font can't be read.
     #[error("the font for labels can't be read: {0}")]
     Font(String),

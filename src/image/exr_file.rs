@@ -13,11 +13,11 @@ use super::{Image, ImageError, Metadata};
 type Channel = ex::AnyChannel<ex::FlatSamples>;
 type Attributes = std::collections::HashMap<ex::Text, ex::AttributeValue>;
 
-/// Writes a picture with its layers. The file appears whole or not at all.
+/// The bytes of a file that holds a picture with its layers.
 ///
 /// # Errors
-/// [`ImageError::Layer`] where a layer's length disagrees with the size, [`ImageError::Io`] where the disk refuses.
-pub fn write_exr(path: &Path, image: &Image) -> Result<(), ImageError> {
+/// [`ImageError::Layer`] where a layer's length disagrees with the size, [`ImageError::Encode`] where the encoder refuses.
+pub fn encode_exr(image: &Image) -> Result<Vec<u8>, ImageError> {
     let channels = channels(image)?;
     let mut attributes = ex::LayerAttributes::default();
     for (key, value) in texts(&image.metadata) {
@@ -32,15 +32,12 @@ pub fn write_exr(path: &Path, image: &Image) -> Result<(), ImageError> {
         ex::AnyChannels::sort(channels.into_iter().collect()),
     );
     let mut bytes = std::io::Cursor::new(Vec::new());
-    let io = |source| ImageError::Io { path: path.into(), source };
-    ex::Image::from_layer(layer)
-        .write()
-        .to_buffered(&mut bytes)
-        .map_err(|e| io(std::io::Error::other(e.to_string())))?;
-    super::write_whole(path, bytes.get_ref())
+    let refused = |e: exr::error::Error| ImageError::Encode { format: "OpenEXR", reason: e.to_string() };
+    ex::Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(refused)?;
+    Ok(bytes.into_inner())
 }
 
-/// Reads a picture: its first layer that has `R`, `G` and `B` (or `Y` alone), and the layers written by [`write_exr`].
+/// Reads a picture: its first layer that has `R`, `G` and `B` (or `Y` alone), and the layers written by [`encode_exr`].
 ///
 /// # Errors
 /// [`ImageError`] naming the file and what was expected.
@@ -164,7 +161,7 @@ mod tests {
         let full = example();
         let bare = Image { standard_error: None, mask: None, metadata: Metadata::default(), ..full.clone() };
         for image in [full, bare] {
-            write_exr(&path, &image).unwrap();
+            std::fs::write(&path, encode_exr(&image).unwrap()).unwrap();
             assert_eq!(read_exr(&path).unwrap(), image);
         }
     }
@@ -176,18 +173,17 @@ mod tests {
         let mut image = example();
         image.radiance[0] = [f64::from(1e-20f32), f64::from(1e20f32), f64::INFINITY];
         image.radiance[1][0] = f64::NAN;
-        write_exr(&path, &image).unwrap();
+        std::fs::write(&path, encode_exr(&image).unwrap()).unwrap();
         let back = read_exr(&path).unwrap();
         assert!(back.radiance[0].iter().zip(&image.radiance[0]).all(|(a, b)| a.to_bits() == b.to_bits()));
         assert!(back.radiance[1][0].is_nan());
     }
 
     #[test]
-    fn broken_files_are_named_and_a_failed_write_leaves_nothing() {
+    fn broken_files_are_named_and_a_wrong_layer_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        write_exr(&path, &example()).unwrap();
-        let bytes = std::fs::read(&path).unwrap();
+        let bytes = encode_exr(&example()).unwrap();
         for length in [0, 3, 100, bytes.len() / 2, bytes.len() - 1] {
             std::fs::write(&path, &bytes[..length]).unwrap();
             let error = read_exr(&path).unwrap_err();
@@ -196,8 +192,6 @@ mod tests {
         assert!(matches!(read_exr(&folder.path().join("none.exr")), Err(ImageError::Io { .. })));
         let mut wrong = example();
         wrong.radiance.pop();
-        let target = folder.path().join("b.exr");
-        assert!(matches!(write_exr(&target, &wrong), Err(ImageError::Layer { layer: "radiance", found: 11, .. })));
-        assert!(!target.exists());
+        assert!(matches!(encode_exr(&wrong), Err(ImageError::Layer { layer: "radiance", found: 11, .. })));
     }
 }

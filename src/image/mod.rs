@@ -1,4 +1,4 @@
-//! Pictures: EXR and PNG in and out, per-pixel metrics, and sheets that show several side by side.
+//! Pictures: EXR in and out, PNG out, per-pixel metrics, and sheets that show several side by side.
 //!
 //! In: radiance per pixel in W/(sr·m²), linear RGB (sRGB's primaries), with standard errors and a mask where they are known. Out: files, and
 //! the numbers in which two pictures differ. The one decision to know: numbers are always taken from linear radiance;
@@ -12,11 +12,11 @@ mod exr_file;
 pub mod sheet;
 mod tone;
 
-pub use bitmap::{Bitmap, write_png};
+pub use bitmap::{Bitmap, encode_png};
 pub use colormap::{ColorMap, DifferenceMap, difference_map};
 pub use compare::{Comparison, Significance, compare};
 pub use error::ImageError;
-pub use exr_file::{read_exr, write_exr};
+pub use exr_file::{encode_exr, read_exr};
 pub use tone::{develop, exposure_for, srgb_encode};
 
 /// A picture of linear radiance with its layers. Pixels run along rows, row 0 on top.
@@ -49,21 +49,4 @@ pub struct Metadata {
     pub seconds: Option<f64>,
     /// Program and version.
     pub program: Option<String>,
-}
-
-/// Writes a file by way of a temporary one beside it, so that it appears whole or not at all.
-fn write_whole(path: &std::path::Path, bytes: &[u8]) -> Result<(), ImageError> {
-    use std::io::Write;
-    let io = |source| ImageError::Io { path: path.into(), source };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| std::path::Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666)); // less the umask: as any other file
-    }
-    let mut file = builder.tempfile_in(folder).map_err(io)?;
-    file.write_all(bytes).map_err(io)?;
-    file.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
 }

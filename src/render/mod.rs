@@ -15,7 +15,6 @@ mod error;
 mod film;
 mod integrator;
 mod lights;
-mod lobes;
 mod material;
 mod ray;
 pub mod scene;

@@ -1,16 +1,17 @@
 //! From the description to the scene that the tracer walks through.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::super::RenderError;
 use super::super::lights::{Light, QuadLight};
-use super::super::lobes::inline_brdf;
 use super::super::material::{Material, Materials, PhongEquation};
 use super::super::shapes::{Geometry, Mesh, Owner, Plane, Quad, Sphere, read_obj};
 use super::CameraSpec;
 use super::spec::{MaterialSpec, MeshNormals, SceneSpec};
+use crate::brdf::Reflectance;
 
 /// A scene to be rendered.
 #[derive(Debug)]
@@ -94,8 +95,14 @@ fn inline(spec: &MaterialSpec) -> Result<Material, &Path> {
             specular: equation.specular.into(),
             alpha: equation.alpha,
         }),
-        None => Material::Brdf(inline_brdf(spec)),
+        None => Material::Brdf(Arc::new(lobes(spec))),
     })
+}
+
+/// The lobes that a scene file writes out.
+fn lobes(spec: &MaterialSpec) -> Reflectance {
+    let phong = spec.phong.iter().map(|lobe| (lobe.ks.to_vec(), lobe.n));
+    Reflectance::lobes(spec.kd.unwrap_or_default().to_vec(), phong)
 }
 
 /// The middle of all bounded shapes where they lie far from the origin compared with their extent, else 0: a scene that
