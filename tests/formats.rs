@@ -411,7 +411,7 @@ fn real_zemax_scatter_is_half_the_integral_without_cosine() {
 /// Whether a fixture is a text format's: neither a generator nor a tensor file.
 fn is_text(path: &Path) -> bool {
     let name = path.file_name().expect("name").to_string_lossy().into_owned();
-    !name.ends_with(".py") && !name.starts_with("rgl-")
+    path.extension().is_none_or(|e| e != "py") && !name.starts_with("rgl-")
 }
 
 #[test]

@@ -1,14 +1,9 @@
 //! Evaluation against other programs, and its speed.
 
 use std::path::Path;
-use std::time::Instant;
 
-use glam::DVec3;
 use goniofit::brdf::Brdf;
 use goniofit::geometry::angles::direction_deg;
-use goniofit::geometry::direction;
-use goniofit::measurement::ReadOptions;
-use goniofit::measurement::formats::rgl;
 use goniofit::numeric::random::{Purpose, RngExt, stream};
 
 use super::{brdf, bytes, fixture, real, root, rows};
