@@ -4,9 +4,8 @@ use std::path::Path;
 
 use goniofit::brdf::Brdf;
 use goniofit::geometry::angles::direction_deg;
-use goniofit::numeric::random::{Purpose, RngExt, stream};
 
-use super::{brdf, bytes, fixture, real, root, rows};
+use super::{brdf, fixture, real, root, rows};
 
 /// Deviations from a reference table relative to the row's largest value, over θ ≤ 85° and θi > 0.
 fn deviations(file: &Path, reference: &Path) -> Vec<f64> {
