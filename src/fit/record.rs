@@ -49,7 +49,10 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
         record.standard_error.push(row.error);
         record.interval_95.push(row.interval);
     }
-    Material { channels: facts.measurement.channels.clone(), lobes, fit: Some(record) }
+    let mut material = Material { channels: facts.measurement.channels.clone(), lobes, fit: None };
+    record.warnings.extend(energy_warning(&material));
+    material.fit = Some(record);
+    material
 }
 
 impl Facts<'_> {
@@ -118,6 +121,16 @@ impl Facts<'_> {
         }
         list
     }
+}
+
+/// Says where the material reflects more than it receives. The directional albedo of every lobe is largest at normal incidence.
+fn energy_warning(material: &Material) -> Option<String> {
+    let albedo = material.directional_albedo(0.0)?;
+    let (channel, most) = albedo.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let name = &material.channels[channel];
+    (*most > 1.0).then(|| {
+        format!("the fit reflects {most:.3} of the light at normal incidence (channel {name}): more than it receives")
+    })
 }
 
 /// Lobes of one kind by ascending mean exponent, at the places that the model gives to their kind; dark ones last.

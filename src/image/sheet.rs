@@ -72,18 +72,21 @@ impl Sheet {
         let columns = self.columns.clamp(1, self.tiles.len().max(1));
         let largest = |size: &dyn Fn(&Bitmap) -> usize| self.tiles.iter().map(|t| size(&t.picture)).max().unwrap_or(0);
         let (cell_width, cell_height) = (largest(&|b| b.width).max(160), largest(&|b| b.height));
-        let below = self.below_height();
-        let (row_height, head) = (LABEL_SIZE as usize + 12 + cell_height + below, self.head_height());
-        let rows = self.tiles.len().div_ceil(columns);
+        let head = self.head_height();
         let grid = columns * cell_width + (columns - 1) * GAP;
         let width = 2 * MARGIN + grid.max(self.head_width(&font));
-        let height = head + rows * row_height + rows.saturating_sub(1) * GAP + MARGIN;
+        let row_heights =
+            self.tiles.chunks(columns).map(|row| LABEL_SIZE as usize + 12 + cell_height + below_height(row));
+        let row_heights: Vec<usize> = row_heights.collect();
+        let height = head + row_heights.iter().map(|h| h + GAP).sum::<usize>() + MARGIN - GAP.min(MARGIN);
         let mut page = Page { bitmap: Bitmap::filled(width, height, PAPER), font };
         page.head(&self.title, &self.subtitle);
-        for (i, tile) in self.tiles.iter().enumerate() {
-            let x = MARGIN + (i % columns) * (cell_width + GAP);
-            let y = head + (i / columns) * (row_height + GAP);
-            page.tile(tile, x, y, cell_height);
+        let mut y = head;
+        for (row, height) in self.tiles.chunks(columns).zip(row_heights) {
+            for (column, tile) in row.iter().enumerate() {
+                page.tile(tile, MARGIN + column * (cell_width + GAP), y, cell_height);
+            }
+            y += height + GAP;
         }
         Ok(page.bitmap)
     }
@@ -98,12 +101,13 @@ impl Sheet {
         let title = text_width(font, &self.title, TITLE_SIZE);
         title.max(text_width(font, &self.subtitle, SMALL_SIZE)).ceil() as usize
     }
+}
 
-    fn below_height(&self) -> usize {
-        let caption = |t: &Tile| if t.caption.is_empty() { 0 } else { SMALL_SIZE as usize + 10 };
-        let scale = |t: &Tile| if t.scale.is_some() { BAR_HEIGHT + SMALL_SIZE as usize + 18 } else { 0 };
-        self.tiles.iter().map(|t| caption(t) + scale(t)).max().unwrap_or(0)
-    }
+/// Height of what stands below the pictures of a row.
+fn below_height(row: &[Tile]) -> usize {
+    let caption = |t: &Tile| if t.caption.is_empty() { 0 } else { SMALL_SIZE as usize + 10 };
+    let scale = |t: &Tile| if t.scale.is_some() { BAR_HEIGHT + SMALL_SIZE as usize + 18 } else { 0 };
+    row.iter().map(|t| caption(t) + scale(t)).max().unwrap_or(0)
 }
 
 impl Page<'_> {

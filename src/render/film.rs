@@ -148,7 +148,7 @@ impl Film {
         self.pixels.iter().map(|p| u64::from(p.samples)).sum()
     }
 
-    /// The picture with its layers. `mask` is the share of a pixel's paths that met a direction where a material is unknown,
+    /// The picture with its layers. `mask` is the share of a pixel's paths for which the surface seen is unknown towards the light,
     /// and 1 where there are no samples.
     #[must_use]
     pub fn to_image(&self) -> Image {

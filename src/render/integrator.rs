@@ -47,7 +47,8 @@ impl Strategy {
 pub struct PathResult {
     /// Radiance, W/(sr·m²).
     pub radiance: DVec3,
-    /// Whether the path asked a material for a value that nobody measured.
+    /// Whether the surface that the camera sees was asked for a value that nobody measured. What is missing of the light that
+    /// arrives by way of other surfaces does not count: it would mark nearly every pixel of a scene.
     pub unknown: bool,
 }
 
@@ -78,6 +79,7 @@ pub struct Tracer<'a> {
 struct Path {
     radiance: DVec3,
     throughput: DVec3,
+    bounces: u32,
     unknown: bool,
 }
 
@@ -91,7 +93,7 @@ impl<'a> Tracer<'a> {
 
     /// Follows one path that starts with `ray` at the camera.
     pub fn trace(&self, mut ray: Ray, rng: &mut Stream) -> PathResult {
-        let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: false };
+        let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, bounces: 0, unknown: false };
         let mut last: Option<Scatter> = None;
         for bounce in 0..=self.scene.max_bounces {
             let Some(surface) = self.scene.geometry.closest(&ray) else {
@@ -145,7 +147,8 @@ impl<'a> Tracer<'a> {
         }
         let drawn = brdf.sample(vertex.wo, [rng.random(), rng.random(), rng.random()])?;
         let (f, known) = eval_rgb(brdf, drawn.wi, vertex.wo);
-        path.unknown |= !known;
+        path.unknown |= !known && path.bounces == 0;
+        path.bounces += 1;
         path.throughput *= f * (drawn.wi.z / drawn.pdf);
         let direction = vertex.frame.to_world(drawn.wi).normalize();
         let above = vertex.point.normal.dot(direction) > 0.0;
@@ -188,7 +191,7 @@ impl<'a> Tracer<'a> {
             return DVec3::ZERO;
         }
         let (f, known) = eval_rgb(brdf, local, vertex.wo);
-        path.unknown |= !known;
+        path.unknown |= !known && path.bounces == 0;
         let weight = pdf.map_or(1.0, |pdf| match self.strategy {
             Strategy::Combined => self.strategy.weight(pdf, brdf.pdf(local, vertex.wo), false),
             fixed => fixed.weight(pdf, 0.0, false),
