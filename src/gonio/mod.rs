@@ -1,6 +1,6 @@
 //! The simulated gonioreflectometer.
 //!
-//! In: a true BRDF, an [`Instrument`], a [`Scan`], a seed. Out: a [`Measurement`] in 1/sr with its σ. The one decision to
+//! In: a true BRDF, an [`Instrument`], a [`Scan`], a seed. Out: a [`crate::measurement::Measurement`] in 1/sr with its σ. The one decision to
 //! know: a reading's noise is keyed by (seed, channel, position in the scan), so it depends on neither threads nor order.
 
 mod instrument;
