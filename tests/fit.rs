@@ -191,3 +191,31 @@ fn one_valid_channel_does_not_need_the_others() {
     let record = got.fit.expect("a record");
     assert!(record.undetermined.contains(&"lambert.weight[g]".to_owned()), "{record:?}");
 }
+
+proptest::proptest! {
+    #![proptest_config(proptest::test_runner::Config {
+        cases: 64,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(7),
+        failure_persistence: None,
+        ..Default::default()
+    })]
+
+    /// Whatever the weights and the exponent, data without noise give them back, from no start value.
+    #[test]
+    fn any_noise_free_material_comes_back(
+        kd in 1e-3f64..1.0,
+        ks in 1e-3f64..1.0,
+        ln_n in 0.0f64..9.0,
+        step in proptest::sample::select(vec![5.0, 7.5, 10.0]),
+    ) {
+        let truth = material(&[kd], &[ks], ln_n.exp());
+        let m = measure(&truth, &Instrument::noiseless(), &Scan::Hemisphere { step_deg: step }, 1);
+        let got = fit(&m, &options("lambert+phong")).expect("a fit").material;
+        let worst = [
+            got.lobes[0].weight[0] / kd,
+            got.lobes[1].weight[0] / ks,
+            exponent(&got, 1) / ln_n.exp(),
+        ].into_iter().map(|r| (r - 1.0).abs()).fold(0.0, f64::max);
+        proptest::prop_assert!(worst < 1e-6, "kd {kd}, ks {ks}, n {}: {worst:e}", ln_n.exp());
+    }
+}
