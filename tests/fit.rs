@@ -216,6 +216,6 @@ proptest::proptest! {
             got.lobes[1].weight[0] / ks,
             exponent(&got, 1) / ln_n.exp(),
         ].into_iter().map(|r| (r - 1.0).abs()).fold(0.0, f64::max);
-        proptest::prop_assert!(worst < 1e-6, "kd {kd}, ks {ks}, n {}: {worst:e}", ln_n.exp());
+        proptest::prop_assert!(worst < 1e-9, "kd {kd}, ks {ks}, n {}: {worst:e}", ln_n.exp());
     }
 }

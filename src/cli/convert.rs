@@ -11,7 +11,7 @@ use super::simulate::parse_scan;
 use super::ui::Ui;
 use crate::chain::{self, Source};
 use crate::gonio::Scan;
-use crate::measurement::{Directions, Format, MerlGrid};
+use crate::measurement::{Dimension, Directions, Format, MerlAngles, MerlGrid, Weights};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -36,6 +36,16 @@ fn parse_written(text: &str) -> Result<Format, String> {
     Format::from_name(text).filter(|f| f.is_written()).ok_or_else(|| "known are merl, csv".into())
 }
 
+/// The MERL grid, read where the user says.
+fn merl_grid(angles: MerlAngles) -> Scan {
+    Scan::List {
+        name: "merl".into(),
+        directions: Directions::Merl(MerlGrid { angles }),
+        weights: Weights::Merl,
+        dimension: Dimension::Space,
+    }
+}
+
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let format = output_format(&args.out, args.to)?;
     let options = args.reading.options();
@@ -50,15 +60,11 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             let flat = material.is_flat();
             let scan = match &args.scan {
                 Some(text) => parse_scan(text)?,
-                None if format == Format::Merl => Scan::Merl,
+                None if format == Format::Merl => merl_grid(options.merl_angles),
                 None if flat => Scan::Flat { step_deg: 1.0 },
                 None => Scan::Hemisphere { step_deg: 5.0 },
             };
-            let mut table = chain::tabulate(&args.input, &material, &scan, ui.control())?;
-            if let Directions::Merl(grid) = &mut table.directions {
-                *grid = MerlGrid { angles: options.merl_angles };
-            }
-            table
+            chain::tabulate(&args.input, &material, &scan, ui.control())?
         }
     };
     for note in &table.notes {
