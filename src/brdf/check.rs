@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::DVec3;
 
 use super::Brdf;
+use crate::numeric::float::larger;
 use crate::numeric::quadrature::integrate_directions;
 
 /// Directional albedo ∫ f(wi, wo) cosθi dωi of one channel by `order`² Gauss–Legendre points in (θ, φ): right for lobes wider
@@ -22,5 +23,5 @@ pub fn reciprocity_error(brdf: &dyn Brdf, a: DVec3, b: DVec3) -> f64 {
     let (mut ab, mut ba) = (vec![0.0; brdf.channels()], vec![0.0; brdf.channels()]);
     brdf.eval(a, b, &mut ab);
     brdf.eval(b, a, &mut ba);
-    ab.iter().zip(&ba).map(|(x, y)| if x == y { 0.0 } else { (x - y).abs() / x.abs().max(y.abs()) }).fold(0.0, f64::max)
+    ab.iter().zip(&ba).map(|(x, y)| if x == y { 0.0 } else { (x - y).abs() / x.abs().max(y.abs()) }).fold(0.0, larger)
 }

@@ -90,18 +90,15 @@ mod named {
     }
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 struct File {
-    format: String,
-    version: u64,
-    model: String,
     channels: Vec<String>,
     lobes: Vec<FileLobe>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    fit: Option<FitRecord>,
+    #[serde(default)]
+    fit: Value,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 struct FileLobe {
     kind: String,
     weight: Vec<f64>,
@@ -128,7 +125,8 @@ impl Material {
         Ok(serde_json::to_string_pretty(&map)?)
     }
 
-    /// Reads the text of a material file. Unknown keys are ignored; lobes whose shape is `null` are dropped.
+    /// Reads the text of a material file. Unknown keys are ignored; lobes whose shape is `null` are dropped, and so is a `fit` object
+    /// that can't be understood: it only tells how the material was found.
     ///
     /// # Errors
     /// [`MaterialError`] naming the field, what was expected and what was found.
@@ -147,7 +145,7 @@ impl Material {
         for (i, lobe) in file.lobes.into_iter().enumerate() {
             lobes.extend(read_lobe(lobe, i, channels)?);
         }
-        Ok(Self { channels: file.channels, lobes, fit: file.fit })
+        Ok(Self { channels: file.channels, lobes, fit: serde_json::from_value(file.fit).ok() })
     }
 }
 
@@ -185,8 +183,8 @@ fn read_lobe(lobe: FileLobe, index: usize, channels: usize) -> Result<Option<Lob
         expected: format!("one of {}", LobeKind::ALL.map(LobeKind::name).join(", ")),
         found: format!("\"{}\"", lobe.kind),
     })?;
-    let right = lobe.weight.len() == channels && lobe.weight.iter().all(|w| w.is_finite());
-    expect(right, &field("weight"), || (format!("{channels} finite numbers"), format!("{:?}", lobe.weight)))?;
+    let right = lobe.weight.len() == channels && lobe.weight.iter().all(|w| w.is_finite() && *w >= 0.0);
+    expect(right, &field("weight"), || (format!("{channels} finite numbers ≥ 0"), format!("{:?}", lobe.weight)))?;
     let parameters = kind.lobe().parameters();
     let Some(values) = lobe.shape else {
         let term = LobeTerm { kind, weight: lobe.weight, shape: Some(Vec::new()) };

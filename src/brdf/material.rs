@@ -76,6 +76,16 @@ impl Material {
         self.lobes.iter().map(|l| l.kind.name()).collect::<Vec<_>>().join("+")
     }
 
+    /// What lobe `l` is called beside its fellows: `phong`, `phong[1]` for the second of the kind.
+    #[must_use]
+    pub fn lobe_name(&self, l: usize) -> String {
+        let kind = self.lobes[l].kind;
+        match self.lobes[..l].iter().filter(|other| other.kind == kind).count() {
+            0 => kind.name().into(),
+            k => format!("{}[{k}]", kind.name()),
+        }
+    }
+
     /// Whether it belongs to the flat world.
     #[must_use]
     pub fn is_flat(&self) -> bool {

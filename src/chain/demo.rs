@@ -41,8 +41,8 @@ impl Default for DemoOptions {
 pub struct DemoFit {
     /// The fitted material with its record.
     pub material: Material,
-    /// Its picture against the truth's.
-    pub image: Comparison,
+    /// Its picture against the truth's; none where the work was stopped before it.
+    pub image: Option<Comparison>,
 }
 
 /// What the demo found.
@@ -58,6 +58,8 @@ pub struct Demo {
     pub fits: Vec<DemoFit>,
     /// Time of each stage, s.
     pub times: Vec<(String, f64)>,
+    /// Whether the work was stopped before its end.
+    pub stopped: bool,
 }
 
 const MATERIAL: &str = "glossy-paint";
@@ -98,11 +100,14 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
     let mut shown = Vec::new();
     let all = std::iter::once((&truth, "truth")).chain(fitted.iter().zip(MODELS));
     for (k, (material, name)) in all.enumerate() {
+        if control.stop.requested() {
+            break;
+        }
         let settings = Options {
             width: options.size,
             height: options.size,
             samples: options.samples,
-            seed: options.seed + k as u64,
+            seed: options.seed.wrapping_add(k as u64),
             ..Options::of(&stage.spec)
         };
         let subject = render_material(name, &Source::Fitted(Box::new(material.clone())), None)?;
@@ -111,18 +116,19 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
         shown.push(Shown { file: name.into(), difference_file: format!("difference-{name}"), label, image });
         lap(&format!("render {name}"));
     }
+    shown.retain(|s| s.image.metadata.samples != Some(0));
     let title = format!("{MATERIAL}, measured and fitted");
-    let subtitle = format!(
-        "{} direction pairs with shot and read noise; {SCENE} scene, {}² pixels, {} samples each",
-        table.len(),
-        options.size,
-        options.samples
-    );
-    let gallery = write_gallery(folder, &title, &subtitle, &shown[0], &shown[1..])?;
-    lap("compare and write");
-
-    let fits = fitted.into_iter().zip(gallery.comparisons).map(|(material, image)| DemoFit { material, image });
-    let demo = Demo { truth, name: MATERIAL, pairs: table.len(), fits: fits.collect(), times };
+    let subtitle =
+        format!("{} direction pairs with shot and read noise; {SCENE} scene, {}² pixels", table.len(), options.size);
+    let mut comparisons = Vec::new();
+    if let Some((reference, others)) = shown.split_first() {
+        comparisons = write_gallery(folder, &title, &subtitle, reference, others)?.comparisons;
+        lap("compare and write");
+    }
+    let mut images = comparisons.into_iter().map(Some).chain(std::iter::repeat_with(|| None));
+    let fits = fitted.into_iter().map(|material| DemoFit { material, image: images.next().flatten() }).collect();
+    let stopped = control.stop.requested();
+    let demo = Demo { truth, name: MATERIAL, pairs: table.len(), fits, times, stopped };
     write_numbers(&folder.join("numbers.json"), &demo)?;
     Ok(demo)
 }
@@ -150,6 +156,7 @@ struct Numbers<'a> {
     truth: serde_json::Value,
     fits: Vec<serde_json::Value>,
     seconds: &'a [(String, f64)],
+    stopped: bool,
 }
 
 impl Demo {
@@ -164,6 +171,7 @@ impl Demo {
             truth: file(&self.truth),
             fits: fits.collect(),
             seconds: &self.times,
+            stopped: self.stopped,
         };
         serde_json::to_value(numbers).unwrap_or_default()
     }

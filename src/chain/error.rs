@@ -79,7 +79,7 @@ pub enum ChainError {
         name: String,
     },
     /// A scan with too many entries.
-    #[error("scan {scan}: its step asks for more than 64 million direction pairs; choose a larger one")]
+    #[error("scan {scan}: its step asks for more than 16 million direction pairs; choose a larger one")]
     ScanTooLarge {
         /// The scan.
         scan: String,

@@ -53,6 +53,16 @@ impl BuiltInMaterial {
         MATERIALS.iter().find(|m| m.name == name)
     }
 
+    /// The material as it is written in a scene file.
+    #[must_use]
+    pub fn toml(&self) -> String {
+        let phong = match self.glossy {
+            [0.0, 0.0, 0.0] => String::new(),
+            ks => format!("phong = [{{ ks = {ks:?}, n = {:?} }}]\n", self.exponent),
+        };
+        format!("[materials.{}]\nkd = {:?}\n{phong}", self.name, self.diffuse)
+    }
+
     /// The material itself, channels r, g, b.
     #[must_use]
     pub fn material(&self) -> Material {

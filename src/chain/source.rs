@@ -41,9 +41,12 @@ pub fn load(name: &str, options: &ReadOptions) -> Result<Source, ChainError> {
     }
     let path = Path::new(name);
     if name == "-" {
-        let mut bytes = Vec::new();
-        std::io::stdin().read_to_end(&mut bytes).map_err(|source| ChainError::io(path, source))?;
-        return from_bytes(path, bytes, options);
+        return from_bytes(path, read_stream(path, std::io::stdin().lock())?, options);
+    }
+    // A pipe gives its bytes once: they are read before they are looked at.
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        let pipe = std::fs::File::open(path).map_err(|source| ChainError::io(path, source))?;
+        return from_bytes(path, read_stream(path, pipe)?, options);
     }
     if !path.exists() && path.extension().is_none() {
         let known = MATERIALS.map(|m| m.name).join(", ");
@@ -66,6 +69,20 @@ pub fn load_material(name: &str) -> Result<Material, ChainError> {
         Source::Fitted(material) => Ok(*material),
         Source::Measured(_) => Err(ChainError::NotAMaterial { path: name.into() }),
     }
+}
+
+/// Most bytes taken from a stream: thirty MERL tables.
+const STREAM_LIMIT: u64 = 1 << 30;
+
+fn read_stream(path: &Path, stream: impl Read) -> Result<Vec<u8>, ChainError> {
+    let mut bytes = Vec::new();
+    stream.take(STREAM_LIMIT + 1).read_to_end(&mut bytes).map_err(|source| ChainError::io(path, source))?;
+    if bytes.len() as u64 > STREAM_LIMIT {
+        let reason =
+            std::io::Error::other(format!("a stream of more than {STREAM_LIMIT} bytes is not read; save it to a file"));
+        return Err(ChainError::io(path, reason));
+    }
+    Ok(bytes)
 }
 
 /// Whether the first byte that is not blank is `{`. What can't be opened is left to the reader, who says why.

@@ -32,17 +32,18 @@ fn parse_limit(text: &str) -> Result<(String, f64), String> {
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let comparison = compare(&read_exr(&args.image)?, &read_exr(&args.reference)?)?;
+    let object = serde_json::to_value(&comparison).map_err(|e| Failure::work(e.to_string()))?;
+    let text = describe(&comparison);
     for (name, limit) in &args.fail_above {
         let value = metric(&comparison, name).ok_or_else(|| {
-            Failure::usage(format!("{name}: neither picture stores the standard errors that it needs"))
+            Failure::usage(format!("{name}: the noise that it needs is not known")).beside(text.clone(), object.clone())
         })?;
         // A value that is not a number is above any limit.
         if value.is_nan() || value > *limit {
-            return Err(Failure::work(format!("{name} is {value:e}, above {limit:e}")));
+            return Err(Failure::work(format!("{name} is {value:e}, above {limit:e}")).beside(text, object));
         }
     }
-    let object = serde_json::to_value(&comparison).map_err(|e| Failure::work(e.to_string()))?;
-    ui.result(&describe(&comparison), &object);
+    ui.result(&text, &object);
     Ok(())
 }
 

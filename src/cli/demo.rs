@@ -8,6 +8,7 @@ use super::fit::plus_minus;
 use super::ui::{self, Ui};
 use crate::brdf::PerChannel;
 use crate::chain::{Demo, DemoFit, DemoOptions, demo};
+use crate::image::Comparison;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  goniofit demo --out my-demo")]
@@ -30,7 +31,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let options = DemoOptions { size: args.size, samples: args.samples, seed: args.seed };
     let demo = demo(&args.out, &options, ui.control())?;
     if ui::stop().requested() {
-        ui.warn("stopped: the pictures have fewer samples than asked for");
+        ui.warn("stopped: pictures are missing or have fewer samples than asked for");
     }
     let mut object = demo.numbers();
     object["out"] = serde_json::json!(args.out);
@@ -70,9 +71,13 @@ fn describe(demo: &Demo) -> String {
     };
     let rmse = |f: &DemoFit| f.material.fit.as_ref().map_or(f64::NAN, |r| r.rmse);
     number(&mut t, "rmse of the fit [1/sr]", &|f| format!("{:.3e}", rmse(f)));
-    number(&mut t, "rmse of the picture", &|f| format!("{:.3e}", f.image.rmse));
-    number(&mut t, "relMSE of the picture", &|f| format!("{:.3e}", f.image.rel_mse));
-    let verdict = |f: &DemoFit| match &f.image.significance {
+    let of_image = |f: &DemoFit, get: fn(&Comparison) -> f64| match &f.image {
+        Some(image) => format!("{:.3e}", get(image)),
+        None => "not rendered".into(),
+    };
+    number(&mut t, "rmse of the picture", &|f| of_image(f, |c| c.rmse));
+    number(&mut t, "relMSE of the picture", &|f| of_image(f, |c| c.rel_mse));
+    let verdict = |f: &DemoFit| match f.image.as_ref().and_then(|c| c.significance.as_ref()) {
         Some(s) if s.differs => "differs from the truth".to_owned(),
         Some(_) => "equal within noise".to_owned(),
         None => "–".to_owned(),

@@ -13,17 +13,24 @@ pub(super) struct Failure {
     pub code: u8,
     /// What to tell the user.
     pub message: String,
+    /// What was found all the same: as text, and as a JSON object that the error joins.
+    pub found: Option<Box<(String, serde_json::Value)>>,
 }
 
 impl Failure {
     /// The command line or an input is wrong.
     pub fn usage(message: impl Into<String>) -> Self {
-        Self { code: 2, message: message.into() }
+        Self { code: 2, message: message.into(), found: None }
     }
 
     /// The work failed.
     pub fn work(message: impl Into<String>) -> Self {
-        Self { code: 1, message: message.into() }
+        Self { code: 1, message: message.into(), found: None }
+    }
+
+    /// With results that were found all the same, as text and as a JSON object.
+    pub fn beside(self, text: String, object: serde_json::Value) -> Self {
+        Self { found: Some(Box::new((text, object))), ..self }
     }
 
     /// An output could not be written.
@@ -52,8 +59,8 @@ impl From<ImageError> for Failure {
 
 impl From<FitError> for Failure {
     fn from(error: FitError) -> Self {
-        let code = if matches!(error, FitError::Option { .. }) { 2 } else { 1 };
-        Self { code, message: error.to_string() }
+        let message = error.to_string();
+        if matches!(error, FitError::Option { .. }) { Self::usage(message) } else { Self::work(message) }
     }
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::write_text;
+use super::output::{check_folder, write_text};
 use super::ui::{self, Ui};
 use crate::brdf::{FitRecord, Material, ModelSpec, PerChannel};
 use crate::fit::{FitOptions, Fitted, Loss, WeightMode, fit};
@@ -59,6 +59,9 @@ fn parse_weights(text: &str) -> Result<WeightMode, String> {
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let targets = targets(args)?;
+    if let Some(out) = &args.out {
+        check_folder(out)?;
+    }
     if let Some(folder) = &args.out_dir {
         std::fs::create_dir_all(folder).map_err(|e| Failure::output(folder, &e))?;
     }
@@ -81,23 +84,21 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             Err(failure) => return Err(failure),
         }
     }
-    let to_stdout = targets.iter().any(|t| t.as_deref() == Some(Path::new("-")));
-    if !to_stdout {
-        let object = if args.files.len() == 1 { results.swap_remove(0) } else { json!({ "fits": results }) };
+    let object = match (args.files.len(), results.pop()) {
+        (1, Some(only)) => only,
+        (_, last) => json!({ "fits": results.into_iter().chain(last).collect::<Vec<_>>() }),
+    };
+    if let Some(first) = failures.first() {
+        let code = failures.iter().map(|f| f.code).min().unwrap_or(1);
+        let count = failures.len();
+        let message =
+            format!("{count} of {} files could not be fitted; the first: {}", args.files.len(), first.message);
+        return Err(Failure { code, ..Failure::work(message).beside(text, object) });
+    }
+    if !targets.iter().any(|t| t.as_deref() == Some(Path::new("-"))) {
         ui.result(&text, &object);
     }
-    match failures.first() {
-        None => Ok(()),
-        Some(first) => Err(Failure {
-            code: failures.iter().map(|f| f.code).min().unwrap_or(1),
-            message: format!(
-                "{} of {} files could not be fitted; the first: {}",
-                failures.len(),
-                args.files.len(),
-                first.message
-            ),
-        }),
-    }
+    Ok(())
 }
 
 /// Where each fit goes; two files of one name are refused before anything is written.
@@ -108,7 +109,10 @@ fn targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
     let Some(folder) = &args.out_dir else { return Ok(vec![args.out.clone(); args.files.len()]) };
     let mut targets: Vec<PathBuf> = Vec::new();
     for file in &args.files {
-        let stem = file.file_stem().map_or_else(|| "stdin".into(), |s| s.to_string_lossy().into_owned());
+        let stem = match file.file_stem() {
+            Some(stem) if stem != "-" => stem.to_string_lossy().into_owned(),
+            _ => "stdin".into(),
+        };
         let target = folder.join(format!("{stem}.json"));
         if targets.contains(&target) {
             return Err(Failure::usage(format!("two measurements would be written to {}", target.display())));
@@ -177,17 +181,14 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
         record.seconds
     );
     for (l, lobe) in material.lobes.iter().enumerate() {
+        let name = material.lobe_name(l);
         for (c, weight) in lobe.weight.iter().enumerate() {
             let error = record.standard_error.get(l).and_then(|r| r.weight.get(c).copied().flatten());
-            let _ = writeln!(
-                t,
-                "  {:22} {}",
-                format!("{}.weight[{}]", lobe.kind.name(), material.channels[c]),
-                plus_minus(*weight, error)
-            );
+            let label = format!("{name}.weight[{}]", material.channels[c]);
+            let _ = writeln!(t, "  {label:22} {}", plus_minus(*weight, error));
         }
         let Some(shape) = &lobe.shape else {
-            let _ = writeln!(t, "  {:22} undetermined: the lobe has no weight", format!("{}.*", lobe.kind.name()));
+            let _ = writeln!(t, "  {:22} undetermined: the lobe has no weight", format!("{name}.*"));
             continue;
         };
         for (i, parameter) in lobe.kind.lobe().parameters().iter().enumerate() {
@@ -196,8 +197,7 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
                 _ => None,
             };
             let value = shape.get(i).and_then(|v| v.get(0)).unwrap_or(f64::NAN);
-            let _ =
-                writeln!(t, "  {:22} {}", format!("{}.{}", lobe.kind.name(), parameter.name), plus_minus(value, error));
+            let _ = writeln!(t, "  {:22} {}", format!("{name}.{}", parameter.name), plus_minus(value, error));
         }
     }
     for warning in &record.warnings {
@@ -206,16 +206,18 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
     t
 }
 
-/// `0.3201 ± 0.0004`: the error to two digits, the value to the same place.
+/// `0.3201 ± 0.0004`: the error to two digits, the value to the same place; powers of ten where that would be long.
 pub(super) fn plus_minus(value: f64, error: Option<f64>) -> String {
-    let Some(error) = error.filter(|e| *e > 0.0 && e.is_finite()) else {
-        return match error {
-            Some(_) => format!("{value:.6}"),
-            None => format!("{value:.6} (undetermined)"),
-        };
-    };
-    let places = (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize;
-    format!("{value:.places$} ± {error:.places$}")
+    let Some(error) = error else { return format!("{value:.6} (undetermined)") };
+    if error == 0.0 {
+        return format!("{value}");
+    }
+    let places = 1.0 - error.log10().floor();
+    if (0.0..=9.0).contains(&places) {
+        let places = places as usize;
+        return format!("{value:.places$} ± {error:.places$}");
+    }
+    format!("{value:.9} ± {error:.1e}")
 }
 
 #[cfg(test)]
@@ -226,6 +228,9 @@ mod tests {
     fn errors_are_shown_to_two_digits() {
         assert_eq!(plus_minus(0.320_123, Some(0.000_41)), "0.32012 ± 0.00041");
         assert_eq!(plus_minus(312.49, Some(12.3)), "312 ± 12");
+        assert_eq!(plus_minus(0.314, Some(7e29)), "0.314000000 ± 7.0e29");
+        assert_eq!(plus_minus(0.3, Some(1e-15)), "0.300000000 ± 1.0e-15");
+        assert_eq!(plus_minus(0.5, Some(0.0)), "0.5");
         assert_eq!(plus_minus(1.5, None), "1.500000 (undetermined)");
     }
 }

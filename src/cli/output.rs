@@ -30,11 +30,20 @@ fn closed_pipe_is_fine(result: io::Result<()>) -> io::Result<()> {
     }
 }
 
+/// The folder of an output must be there before long work starts.
+pub(super) fn check_folder(out: &Path) -> Result<(), Failure> {
+    if out == Path::new("-") {
+        return Ok(());
+    }
+    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    if folder.is_dir() { Ok(()) } else { Err(Failure::usage(format!("{}: there is no such folder", folder.display()))) }
+}
+
 /// The format to write a measurement in: as asked, else by the extension, CSV on stdout.
 pub(super) fn output_format(path: &Path, asked: Option<Format>) -> Result<Format, Failure> {
     let known = || {
         Failure::usage(format!(
-            "{}: its extension names no format that can be written; use .binary (MERL) or .csv, or say --to",
+            "{}: its extension names no format that can be written; use .binary (MERL) or .csv",
             path.display()
         ))
     };

@@ -1,11 +1,11 @@
 //! `goniofit render`: one picture.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::write_bytes;
+use super::output::{check_folder, write_bytes};
 use super::ui::{self, Ui};
 use crate::chain::{self, Stage};
 use crate::image::{Image, develop, encode_exr, encode_png, exposure_for};
@@ -31,7 +31,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "IMG.png")]
     png: Option<PathBuf>,
     /// Exposure of the preview, stops (default: the brightest 1 % clips)
-    #[arg(long, allow_negative_numbers = true, requires = "png")]
+    #[arg(long, allow_negative_numbers = true, requires = "png", value_parser = parse_exposure)]
     exposure: Option<f64>,
 }
 
@@ -53,6 +53,12 @@ pub(super) struct PictureArgs {
     /// Channels to show as red, green and blue
     #[arg(long, value_parser = parse_rgb, value_name = "A,B,C")]
     pub rgb: Option<[String; 3]>,
+}
+
+/// Stops: a number from −100 to 100.
+pub(super) fn parse_exposure(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| (-100.0..=100.0).contains(v));
+    value.ok_or_else(|| "expected a number of stops from -100 to 100".into())
 }
 
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -89,6 +95,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         None => args.picture.stage()?,
     };
     check_folder(&args.out)?;
+    if let Some(png) = &args.png {
+        check_folder(png)?;
+        if png == &args.out {
+            return Err(Failure::usage("--png and --out name the same file"));
+        }
+    }
     let options = args.picture.options(&stage);
     let image = match &args.material {
         Some(name) => chain::picture_of(name, args.picture.rgb.as_ref(), &stage, &options, ui.control())?,
@@ -123,12 +135,6 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     });
     ui.result(&text, &object);
     Ok(())
-}
-
-/// The folder of an output must be there before long work starts.
-pub(super) fn check_folder(out: &Path) -> Result<(), Failure> {
-    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    if folder.is_dir() { Ok(()) } else { Err(Failure::usage(format!("{}: there is no such folder", folder.display()))) }
 }
 
 fn unknown_share(image: &Image) -> f64 {

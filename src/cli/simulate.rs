@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{output_format, write_measurement};
+use super::output::{check_folder, output_format, write_measurement};
 use super::ui::Ui;
 use crate::chain;
 use crate::gonio::{Instrument, Scan, SimulationSpec};
@@ -47,10 +47,14 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let format = output_format(&args.out, None)?;
+    check_folder(&args.out)?;
     let plan = Plan::new(args)?;
     let source = chain::load(&plan.material, &ReadOptions::default())?;
     let name = Path::new(&plan.material).file_stem().map_or("simulated".into(), |s| s.to_string_lossy());
     let table = chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
+    for note in &table.notes {
+        ui.warn(note);
+    }
     write_measurement(&table, &args.out, format, ui)?;
     let valid = table.values.len() as u64 - table.masked.total();
     if args.out.as_os_str() != "-" {

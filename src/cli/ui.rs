@@ -49,7 +49,7 @@ impl Ui {
     /// A remark on stderr, unless quiet.
     pub fn note(&self, text: &str) {
         if !self.quiet {
-            self.bar.aside(|| eprintln!("{text}"));
+            self.bar.aside(|| print_aside(text));
         }
     }
 
@@ -68,6 +68,11 @@ impl Ui {
     }
 }
 
+/// Prints a line on stderr; a closed pipe is no error.
+fn print_aside(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
 /// Prints a line on stdout; a closed pipe is no error.
 fn print_line(text: &str) {
     let mut out = std::io::stdout().lock();
@@ -77,10 +82,15 @@ fn print_line(text: &str) {
 /// Says why a command failed, as `{"error": …}` on stdout or as text on stderr.
 pub(super) fn report_failure(failure: &Failure, json: bool) -> ExitCode {
     if json {
-        print_line(&serde_json::json!({ "error": failure.message }).to_string());
+        let mut object = failure.found.as_ref().map_or_else(|| serde_json::json!({}), |found| found.1.clone());
+        object["error"] = failure.message.as_str().into();
+        print_line(&object.to_string());
     } else {
+        if let Some(found) = &failure.found {
+            print_line(found.0.trim_end());
+        }
         let message = failure.message.strip_prefix("error: ").unwrap_or(&failure.message);
-        eprintln!("error: {message}");
+        print_aside(&format!("error: {message}"));
     }
     ExitCode::from(failure.code)
 }

@@ -1,7 +1,7 @@
 //! `goniofit validate`: a table and its fits under the same light.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -10,6 +10,7 @@ use super::info::Reading;
 use super::output::write_text;
 use super::render::PictureArgs;
 use super::ui::{self, Ui};
+use crate::brdf::Material;
 use crate::chain::{self, Shown, Source, Stage};
 use crate::control::Control;
 use crate::image::Image;
@@ -48,25 +49,37 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         studio.shown(0, "table", &args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)))?;
     let mut others = Vec::new();
     for (k, (file, material)) in fits.iter().enumerate() {
-        let label = format!("fit: {}", material.model());
+        if ui::stop().requested() {
+            break;
+        }
+        let label = label(file, material, fits.len());
         others.push(studio.shown(k as u64 + 1, &label, file, &Source::Fitted(Box::new(material.clone())))?);
     }
-    if ui::stop().requested() {
-        ui.warn("stopped: the pictures have fewer samples than asked for");
+    let stopped = ui::stop().requested();
+    others.retain(|shown| shown.image.metadata.samples != Some(0));
+    if stopped {
+        ui.warn("stopped: pictures are missing or have fewer samples than asked for");
     }
-    let subtitle = format!("{} scene, {} samples a pixel", stage.spec.name, options.samples);
+    if reference.image.metadata.samples == Some(0) {
+        return Err(Failure::work("stopped before the first picture had any sample: nothing was written"));
+    }
+    let subtitle =
+        format!("{} scene, {} samples a pixel", stage.spec.name, reference.image.metadata.samples.unwrap_or(0));
     let gallery = chain::write_gallery(&args.out, &name, &subtitle, &reference, &others)?;
     let rows: Vec<_> = (fits.iter().zip(&gallery.comparisons).enumerate())
         .map(|(k, ((file, m), c))| json!({ "fit": file, "model": m.model(), "picture": format!("fit-{}.exr", k + 1), "image": c }))
         .collect();
     let object = json!({
         "measurement": args.measurement, "scene": stage.spec.name, "samples": options.samples, "seed": options.seed,
-        "exposure": gallery.exposure, "fits": rows, "out": args.out,
+        "exposure": gallery.exposure, "fits": rows, "out": args.out, "stopped": stopped,
     });
     let numbers = serde_json::to_string_pretty(&object).map_err(|e| Failure::work(e.to_string()))?;
     write_text(&args.out.join("numbers.json"), &(numbers + "\n"))?;
     let mut text = format!("{name}, {} scene, {} samples a pixel\n", stage.spec.name, options.samples);
     let _ = writeln!(text, "  {:28} {:>10} {:>10} {:>8} {:>8}  beyond noise", "", "rmse", "relMSE", "PSNR", "masked");
+    for (file, _) in fits.iter().skip(gallery.comparisons.len()) {
+        ui.warn(&format!("{file}: not rendered"));
+    }
     for ((file, m), c) in fits.iter().zip(&gallery.comparisons) {
         let differs = c.significance.as_ref().map_or("–", |s| if s.differs { "yes" } else { "no" });
         let psnr = c.psnr.map_or("–".into(), |p| format!("{p:.1}"));
@@ -77,6 +90,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let _ = writeln!(text, "  written to {}", args.out.display());
     ui.result(&text, &object);
     Ok(())
+}
+
+/// What stands above a fit's picture: its model, and its file where there are several.
+fn label(file: &str, material: &Material, fits: usize) -> String {
+    let stem = Path::new(file).file_stem().map_or_else(|| file.into(), |s| s.to_string_lossy());
+    if fits == 1 { format!("fit: {}", material.model()) } else { format!("{stem}: {}", material.model()) }
 }
 
 /// Where and how the pictures are taken.

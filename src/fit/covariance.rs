@@ -14,7 +14,7 @@ pub type Interval = (f64, f64);
 /// Uncertainty of every parameter; `None` where the data don't determine it.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
-    /// Standard error of each weight, `[channel][lobe]`.
+    /// Standard error of each weight, `[channel][lobe]`, in the fit's own scale of the data.
     pub weights: Vec<Vec<Option<f64>>>,
     /// Standard error of each ln(shape).
     pub ln_shapes: Vec<Option<f64>>,
@@ -81,7 +81,7 @@ fn sandwich(normal: &DMatrix<f64>, spread: &DMatrix<f64>, common: &[DVector<f64>
         .map(|i| {
             let open: f64 = (0..inverse.len()).filter(|&k| inverse[k] == 0.0).map(|k| v[(i, k)].powi(2)).sum();
             let variance = covariance[(i, i)];
-            (scale[i] > 0.0 && open < INVOLVED && variance >= 0.0).then(|| variance.sqrt())
+            (scale[i] > 0.0 && open < INVOLVED && variance.is_finite() && variance >= 0.0).then(|| variance.sqrt())
         })
         .collect()
 }
@@ -118,7 +118,7 @@ fn channel_sums(
                 .map(|i| {
                     let model: f64 = phi.iter().zip(x.iter()).map(|(p, x)| x * p[i]).sum();
                     let r = model - g[i] * y[i];
-                    match sigma.map(|s| g[i] * s[index[i] as usize]) {
+                    match sigma.map(|s| g[i] * s[index[i] as usize] / samples.scale) {
                         Some(s) if s.is_finite() => w[i] * w[i] * s * s,
                         _ => w[i] * w[i] * r * r * inflation,
                     }
@@ -135,7 +135,9 @@ fn channel_sums(
                 }
                 for (component, total) in sums.common.iter_mut().enumerate() {
                     let u = measurement.common_plane(component, channel);
-                    let moved = |(&i, g): (&u32, &f64)| if u[i as usize].is_finite() { g * u[i as usize] } else { 0.0 };
+                    let moved = |(&i, g): (&u32, &f64)| {
+                        if u[i as usize].is_finite() { g * u[i as usize] / samples.scale } else { 0.0 }
+                    };
                     total[a] = weighted.iter().zip(index.iter().zip(g).map(moved)).map(|(w, u)| w * u).sum();
                 }
             }

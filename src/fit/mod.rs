@@ -49,6 +49,9 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let problem = varpro::Profile::new(&samples, &model);
     let outcome = search(&problem, options)?;
     let solution = problem.solve(outcome.t.as_slice());
+    if !solution.cost.is_finite() {
+        return Err(FitError::Solver { reason: "the cost is not finite".into() });
+    }
     let uncertainty = covariance::uncertainty(&problem, &solution, measurement);
     let material = record::material(&record::Facts {
         measurement,

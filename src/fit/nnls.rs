@@ -12,8 +12,8 @@ pub(super) fn solve(gram: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     let n = b.len();
     // Where all may be positive that is the minimum; of equal minima it has the smallest norm.
     let free = solve_free(gram, b);
-    if free.iter().all(|v| *v >= 0.0) {
-        return free;
+    if free.iter().all(|v| *v >= 0.0 || v.is_nan()) {
+        return free; // NaN included: it must not turn into a number
     }
     let mut best = (0.0, DVector::zeros(n));
     for set in 1u32..(1 << n) - 1 {

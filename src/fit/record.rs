@@ -35,8 +35,8 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
         loss: facts.options.loss.name().into(),
         weights: if samples.solid_angle { WeightMode::SolidAngle } else { WeightMode::Uniform }.name().into(),
         samples: samples.len() as u64,
-        cost: facts.solution.cost,
-        rmse: (facts.solution.cost / samples.residuals().max(1) as f64).sqrt(),
+        cost: facts.solution.cost * samples.scale * samples.scale,
+        rmse: (facts.solution.cost / samples.residuals().max(1) as f64).sqrt() * samples.scale,
         iterations: facts.outcome.history.len().saturating_sub(1) as u64,
         seconds: facts.seconds,
         undetermined: undetermined(&rows, &facts.measurement.channels),
@@ -59,11 +59,12 @@ impl Facts<'_> {
     fn row(&self, l: usize) -> Row {
         let kind = self.problem.kinds[l];
         let q = self.uncertainty.quantile;
-        let weight: Vec<f64> = self.solution.weights.iter().map(|x| x[l]).collect();
+        let unit = self.problem.samples.scale;
+        let weight: Vec<f64> = self.solution.weights.iter().map(|x| x[l] * unit).collect();
         let dark = weight.iter().all(|w| *w == 0.0);
-        let errors: Vec<Option<f64>> = self.uncertainty.weights.iter().map(|e| e[l]).collect();
+        let errors: Vec<Option<f64>> = self.uncertainty.weights.iter().map(|e| e[l].map(|e| e * unit)).collect();
         // A weight is never negative, so neither is its interval.
-        let around = |(w, e): (&f64, &Option<f64>)| e.map(|e| ((w - q * e).max(0.0), w + q * e));
+        let around = |(w, e): (&f64, &Option<f64>)| finite(e.map(|e| ((w - q * e).max(0.0), w + q * e)));
         let mut row = Row {
             error: LobeRecord { weight: errors.clone(), shape: Vec::new() },
             interval: LobeRecord { weight: weight.iter().zip(&errors).map(around).collect(), shape: Vec::new() },
@@ -72,10 +73,12 @@ impl Facts<'_> {
         let mut shape = Vec::new();
         for (i, (_, parameter)) in self.problem.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l) {
             let value = self.solution.t[i].exp();
-            let error = if dark { None } else { self.uncertainty.ln_shapes[i] };
+            // An error wider than the whole range that is searched means that the data leave the shape open.
+            let range = (parameter.bounds.1 / parameter.bounds.0).ln();
+            let error = self.uncertainty.ln_shapes[i].filter(|e| !dark && *e < range);
             shape.push(PerChannel::Shared(value));
             row.error.shape.push((parameter.name.into(), PerChannel::Shared(error.map(|e| e * value))));
-            let interval = error.map(|e| (value * (-q * e).exp(), value * (q * e).exp()));
+            let interval = finite(error.map(|e| (value * (-q * e).exp(), value * (q * e).exp())));
             row.interval.shape.push((parameter.name.into(), PerChannel::Shared(interval)));
         }
         if !dark || shape.is_empty() {
@@ -86,17 +89,13 @@ impl Facts<'_> {
 
     fn status(&self) -> &'static str {
         let bounds = self.problem.bounds();
-        let ends = self.solution.t.iter().zip(&bounds).any(|(t, (low, high))| t <= low || t >= high);
+        let at_end = |i: usize| self.solution.t[i] <= bounds[i].0 || self.solution.t[i] >= bounds[i].1;
+        let lit = |lobe: usize| self.solution.weights.iter().any(|x| x[lobe] > 0.0);
         match self.outcome.stop {
             Stop::MaxIterations => "max-iterations",
-            _ if ends && self.lit() => "at-bound",
+            _ if self.problem.layout.iter().enumerate().any(|(i, (lobe, _))| at_end(i) && lit(*lobe)) => "at-bound",
             _ => "converged",
         }
-    }
-
-    /// Whether any lobe with a shape has a weight.
-    fn lit(&self) -> bool {
-        self.problem.layout.iter().any(|(l, _)| self.solution.weights.iter().any(|x| x[*l] > 0.0))
     }
 
     fn warnings(&self, record: &FitRecord) -> Vec<String> {
@@ -131,6 +130,11 @@ fn energy_warning(material: &Material) -> Option<String> {
     (*most > 1.0).then(|| {
         format!("the fit reflects {most:.3} of the light at normal incidence (channel {name}): more than it receives")
     })
+}
+
+/// An interval with both ends finite, else none: a file has no form for infinity.
+fn finite(interval: Option<(f64, f64)>) -> Option<(f64, f64)> {
+    interval.filter(|(low, high)| low.is_finite() && high.is_finite())
 }
 
 /// Lobes of one kind by ascending mean exponent, at the places that the model gives to their kind; dark ones last.

@@ -16,8 +16,12 @@ pub(super) struct Samples {
     pub slope: Vec<f64>,
     /// Normalised weight w, one list for all channels or one a channel (0 where that channel is masked).
     weight: Vec<Vec<f64>>,
-    /// Measured value of each channel, 0 where masked.
+    /// Measured value of each channel over [`Samples::scale`], 0 where masked.
     pub data: Vec<Vec<f64>>,
+    /// The power of two that the data were divided by, so that no unit of theirs over- or underflows when squared.
+    pub scale: f64,
+    /// Σ w g² y² of each channel's data.
+    pub energy: Vec<f64>,
     /// Samples with a positive weight in each channel.
     pub counts: Vec<usize>,
     /// Coordinate of each distinct lobe kind of the model.
@@ -46,21 +50,27 @@ impl Samples {
         let slope: Vec<f64> = picked.iter().map(|p| p.2).collect();
         drop(picked);
         let (weight, counts) = channel_weights(measurement, &index, &raw);
+        let scale = scale_of(measurement, &index)?;
         let data: Vec<Vec<f64>> = (0..measurement.channels.len())
             .map(|c| {
                 let plane = measurement.plane(c);
-                index.par_iter().map(|&i| if plane[i as usize].is_nan() { 0.0 } else { plane[i as usize] }).collect()
+                let value = |&i: &u32| if plane[i as usize].is_nan() { 0.0 } else { plane[i as usize] / scale };
+                index.par_iter().map(value).collect()
             })
             .collect();
-        let largest = data.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
-        if !(largest * largest * index.len() as f64).is_finite() {
-            return Err(FitError::Overflow { name: measurement.name.clone(), largest });
-        }
         let mut kinds: Vec<LobeKind> = model.lobes().to_vec();
         kinds.sort_unstable();
         kinds.dedup();
         let coordinates = coordinates(measurement, &index, &kinds);
-        Ok(Self { index, slope, weight, data, counts, coordinates, solid_angle })
+        let mut samples =
+            Self { index, slope, weight, data, scale, energy: Vec::new(), counts, coordinates, solid_angle };
+        samples.energy = (0..samples.data.len()).map(|c| samples.channel_energy(c)).collect();
+        Ok(samples)
+    }
+
+    fn channel_energy(&self, channel: usize) -> f64 {
+        let (w, y) = (self.weight(channel), &self.data[channel]);
+        sum::sum_blocks(self.len(), |i| w[i] * (self.slope[i] * y[i]).powi(2))
     }
 
     /// Number of samples.
@@ -136,15 +146,30 @@ fn pick(measurement: &Measurement, options: &FitOptions, solid_angle: bool) -> R
     Ok(picked)
 }
 
+/// The power of two next to the largest value; 1 for data that are all 0.
+fn scale_of(measurement: &Measurement, index: &[u32]) -> Result<f64, FitError> {
+    let largest_in = |c: usize| {
+        let plane = measurement.plane(c);
+        index.par_iter().map(|&i| plane[i as usize].abs()).filter(|v| !v.is_nan()).reduce(|| 0.0, f64::max)
+    };
+    let largest = (0..measurement.channels.len()).map(largest_in).fold(0.0, f64::max);
+    // The cost is reported in the data's unit squared.
+    if !(largest * largest * index.len() as f64).is_finite() {
+        return Err(FitError::Overflow { name: measurement.name.clone(), largest });
+    }
+    Ok(if largest > 0.0 { largest.log2().floor().exp2() } else { 1.0 })
+}
+
 /// Weights normalised to Σw = number of samples, channel by channel, as one list where all channels have the same mask.
 fn channel_weights(measurement: &Measurement, index: &[u32], raw: &[f64]) -> (Vec<Vec<f64>>, Vec<usize>) {
     let channels = measurement.channels.len();
+    let largest = raw.iter().copied().fold(0.0, f64::max); // of any size: sums must not overflow
     let masked = |c: usize, i: u32| measurement.plane(c)[i as usize].is_nan();
     let alike = index.par_iter().all(|&i| (1..channels).all(|c| masked(c, i) == masked(0, i)));
     let lists: Vec<(Vec<f64>, usize)> = (0..if alike { 1 } else { channels })
         .map(|c| {
             let mut w: Vec<f64> =
-                index.par_iter().zip(raw).map(|(&i, &w)| if masked(c, i) { 0.0 } else { w }).collect();
+                index.par_iter().zip(raw).map(|(&i, &w)| if masked(c, i) { 0.0 } else { w / largest }).collect();
             let count = w.iter().filter(|w| **w > 0.0).count();
             let total = sum::sum_blocks(w.len(), |i| w[i]);
             if total > 0.0 {

@@ -6,6 +6,8 @@
 use argmin::core::{Error, Executor, IterState, KV, Problem, Solver, State, TerminationReason};
 use nalgebra::{DMatrix, DVector};
 
+use crate::numeric::float::larger;
+
 /// A least-squares problem as the solver sees it.
 pub trait Linearize {
     /// Σ r² at `p`.
@@ -151,8 +153,9 @@ impl LevenbergMarquardt {
         (p <= low && gradient > 0.0) || (p >= high && gradient < 0.0)
     }
 
-    /// The damped step, projected into the bounds; held parameters stay.
-    fn step(&self, at: &Linearization, p: &DVector<f64>, scale: &DVector<f64>, held: &[bool]) -> DVector<f64> {
+    /// The point that the damped step leads to, projected into the bounds; held parameters stay. `None` where the damped
+    /// equations have no solution in floating point.
+    fn step(&self, at: &Linearization, p: &DVector<f64>, scale: &DVector<f64>, held: &[bool]) -> Option<DVector<f64>> {
         let (rows, n) = at.factor.shape();
         let mut stacked = DMatrix::zeros(rows + n, n);
         let mut rhs = DVector::zeros(rows + n);
@@ -167,11 +170,11 @@ impl LevenbergMarquardt {
         rhs.rows_mut(0, rows).copy_from(&-&at.rhs);
         let qr = stacked.qr();
         qr.q_tr_mul(&mut rhs);
-        let delta = qr.r().solve_upper_triangular(&rhs.rows(0, n).into_owned()).unwrap_or_else(|| DVector::zeros(n));
-        DVector::from_fn(n, |i, _| {
+        let delta = qr.r().solve_upper_triangular(&rhs.rows(0, n).into_owned())?;
+        Some(DVector::from_fn(n, |i, _| {
             let (low, high) = self.bounds_of(i);
-            if held[i] { 0.0 } else { (p[i] + delta[i]).clamp(low, high) - p[i] }
-        })
+            if held[i] { p[i] } else { (p[i] + delta[i]).clamp(low, high) }
+        }))
     }
 
     /// Largest cosine between the residuals and a free column.
@@ -181,7 +184,7 @@ impl LevenbergMarquardt {
             .filter(|&j| !held[j])
             .map(|j| (gradient[j].abs(), at.factor.column(j).norm() * norm))
             .map(|(g, scale)| if g == 0.0 || scale == 0.0 { 0.0 } else { g / scale })
-            .fold(0.0, f64::max)
+            .fold(0.0, larger)
     }
 
     fn finish(&mut self, state: LmState, stop: Stop) -> LmState {
@@ -227,21 +230,25 @@ impl<O: Linearize> Solver<O, LmState> for LevenbergMarquardt {
             None => problem.problem("linearize_count", |o| o.linearize(&p))?,
         };
         let gradient = at.factor.transpose() * &at.rhs;
-        let held: Vec<bool> = (0..p.len()).map(|i| self.held(i, p[i], gradient[i])).collect();
+        // A column of zeros, a lobe without weight say, gives no direction: its parameter stays.
+        let idle = |i: usize| at.factor.column(i).norm() == 0.0;
+        let held: Vec<bool> = (0..p.len()).map(|i| idle(i) || self.held(i, p[i], gradient[i])).collect();
         let cosine = Self::largest_cosine(&at, &gradient, &held);
         if at.cost <= 0.0 || cosine <= self.gtol {
             let state = state.param(p).cost(at.cost);
             return Ok((self.finish(state, Stop::Gradient { cosine }), None));
         }
-        let scale = DVector::from_fn(p.len(), |j, _| at.factor.column(j).norm().max(f64::MIN_POSITIVE));
+        let scale = DVector::from_fn(p.len(), |j, _| at.factor.column(j).norm());
         loop {
-            let delta = self.step(&at, &p, &scale, &held);
-            let length = delta.iter().zip(p.iter()).map(|(d, p)| d.abs() / (p.abs() + 1.0)).fold(0.0, f64::max);
+            let Some(next) = self.step(&at, &p, &scale, &held).filter(|next| next.iter().all(|x| x.is_finite())) else {
+                return Err(Error::msg("a step is not finite: the problem's derivatives overflow"));
+            };
+            let delta = &next - &p;
+            let length = delta.iter().zip(p.iter()).map(|(d, p)| d.abs() / (p.abs() + 1.0)).fold(0.0, larger);
             if length <= self.xtol {
                 let state = state.param(p).cost(at.cost);
                 return Ok((self.finish(state, Stop::Step { length }), None));
             }
-            let next = &p + &delta;
             let cost = problem.problem("cost_count", |o| o.cost(&next))?;
             let predicted = -(2.0 * gradient.dot(&delta) + (&at.factor * &delta).norm_squared());
             let actual = at.cost - cost;
@@ -331,6 +338,22 @@ mod tests {
         let out = minimize(Rosenbrock, lm, DVector::from_vec(vec![-1.2, 1.0]), 200).expect("runs");
         // On x = ½ the minimum is y = x².
         assert!((out.t[0] - 0.5).abs() < 1e-15 && (out.t[1] - 0.25).abs() < 1e-9, "{out:?}");
+    }
+
+    #[test]
+    fn a_column_of_zeros_does_not_stop_the_others() {
+        struct Idle;
+        impl Linearize for Idle {
+            fn cost(&self, p: &DVector<f64>) -> Result<f64, Error> {
+                Ok((p[0] - 3.0).powi(2) + 1.0)
+            }
+            fn linearize(&self, p: &DVector<f64>) -> Result<Linearization, Error> {
+                let r = DVector::from_vec(vec![p[0] - 3.0, 1.0]);
+                Ok(Linearization::from_jacobian(&r, DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0])))
+            }
+        }
+        let out = minimize(Idle, LevenbergMarquardt::default(), DVector::from_vec(vec![-7.0, 5.0]), 50).expect("runs");
+        assert!((out.t[0] - 3.0).abs() < 1e-9 && out.t[1] == 5.0, "{out:?}");
     }
 
     #[test]

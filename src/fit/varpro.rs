@@ -9,6 +9,9 @@ use super::samples::Samples;
 use super::solver::{Linearization, Linearize};
 use crate::brdf::{LobeKind, ModelSpec, Parameter};
 
+/// A lobe whose share of a channel's root-sum-square is below this is rounding: 16 units in the last place.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
 /// The reduced problem: parameters t = ln(shape), lobe by lobe.
 #[derive(Debug)]
 pub(super) struct Profile<'a> {
@@ -62,35 +65,26 @@ impl<'a> Profile<'a> {
             .collect()
     }
 
-    /// The minimum over the weights at `t`, its last digits won back by one step on true residuals.
+    /// The minimum over the weights at `t`, its last digits won back by one step on true residuals. Weights that are nothing
+    /// but rounding are 0.
     pub fn solve(&self, t: &[f64]) -> Solution {
         let lobes = self.shaped(t);
         let moments = passes::moments(self.samples, &lobes, false);
         let mut weights = self.weights(&moments);
-        let mut cost = f64::INFINITY;
-        for _ in 0..2 {
-            let now = passes::residuals(self.samples, &lobes, &weights);
-            if now.cost >= cost {
-                break;
-            }
-            cost = now.cost;
-            let refined: Vec<DVector<f64>> = weights
-                .iter()
-                .enumerate()
-                .map(|(c, x)| {
-                    let active = active(x);
-                    let step =
-                        nnls::solve_free(&sub(moments.gram(c), &active, &active), &now.lobes[c].select_rows(&active));
-                    let mut y = x.clone();
-                    active.iter().zip(step.iter()).for_each(|(&i, s)| y[i] -= s);
-                    if y.iter().all(|v| *v >= 0.0) { y } else { x.clone() }
-                })
-                .collect();
-            let then = passes::residuals(self.samples, &lobes, &refined);
-            if then.cost < cost {
-                (weights, cost) = (refined, then.cost);
+        for (c, x) in weights.iter_mut().enumerate() {
+            let floor = ROUNDING * self.samples.energy[c].sqrt();
+            for l in 0..x.len() {
+                if x[l] * moments.gram(c)[(l, l)].sqrt() <= floor {
+                    x[l] = 0.0;
+                }
             }
         }
+        let first = passes::residuals(self.samples, &lobes, &weights);
+        let refined: Vec<DVector<f64>> =
+            weights.iter().enumerate().map(|(c, x)| refine(x, moments.gram(c), &first.lobes[c])).collect();
+        let second = passes::residuals(self.samples, &lobes, &refined);
+        let better = second.cost < first.cost;
+        let (weights, cost) = if better { (refined, second.cost) } else { (weights, first.cost) };
         Solution { t: t.to_vec(), lobes, weights, cost }
     }
 
@@ -113,6 +107,15 @@ impl<'a> Profile<'a> {
         }
         normal
     }
+}
+
+/// One step of iterative refinement on the positive weights, from what their normal equations leave.
+fn refine(x: &DVector<f64>, gram: &DMatrix<f64>, left: &DVector<f64>) -> DVector<f64> {
+    let active = active(x);
+    let step = nnls::solve_free(&sub(gram, &active, &active), &left.select_rows(&active));
+    let mut y = x.clone();
+    active.iter().zip(step.iter()).for_each(|(&i, s)| y[i] -= s);
+    if y.iter().all(|v| *v >= 0.0) { y } else { x.clone() }
 }
 
 fn active(x: &DVector<f64>) -> Vec<usize> {

@@ -43,12 +43,12 @@ impl Instrument {
     /// What is wrong with the numbers, if anything.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
-        let said = |name: &str, range: &str, found: f64| Some(format!("{name}: expected {range}, found {found}"));
+        let said = |name: &str, range: &str, found: f64| Some(format!("{name}: expected {range}, found {found:e}"));
         if !(self.electrons >= 0.0 && self.electrons <= 1e15) {
             return said("instrument.electrons", "a number from 0 (no noise) to 1e15", self.electrons);
         }
-        if !(self.read_noise >= 0.0 && self.read_noise.is_finite()) {
-            return said("instrument.read_noise", "a finite number ≥ 0", self.read_noise);
+        if !(self.read_noise >= 0.0 && self.read_noise <= 1e15) {
+            return said("instrument.read_noise", "a number from 0 to 1e15", self.read_noise);
         }
         (self.readings == 0).then(|| "instrument.readings: expected at least 1, found 0".to_owned())
     }
@@ -70,12 +70,19 @@ impl Instrument {
 }
 
 fn shot(mean: f64, seed: u64, index: u64) -> f64 {
-    // A negative mean (a table's noise as the truth) has no photons.
-    Poisson::new(mean).map_or(0.0, |p| p.sample(&mut stream(seed, Purpose::ShotNoise, index)))
+    let mut rng = stream(seed, Purpose::ShotNoise, index);
+    if mean <= 0.0 {
+        return 0.0; // a table's noise as the truth: no photons
+    }
+    // Beyond 10⁹ counts a Poisson distribution is normal to all digits that are drawn; not a number stays so.
+    match Poisson::new(mean).ok().filter(|_| mean < 1e9) {
+        Some(poisson) => poisson.sample(&mut rng),
+        None => mean + mean.sqrt() * Normal::new(0.0, 1.0).map_or(f64::NAN, |n| n.sample(&mut rng)),
+    }
 }
 
 fn normal(seed: u64, index: u64) -> f64 {
-    Normal::new(0.0, 1.0).map_or(0.0, |n| n.sample(&mut stream(seed, Purpose::ReadNoise, index)))
+    Normal::new(0.0, 1.0).map_or(f64::NAN, |n| n.sample(&mut stream(seed, Purpose::ReadNoise, index)))
 }
 
 #[cfg(test)]
@@ -84,7 +91,9 @@ mod tests {
 
     #[test]
     fn readings_scatter_round_the_truth_by_the_sigma_they_state() {
-        for (f, electrons, readings) in [(0.2, 1e5, 1), (5.0, 1e4, 4), (1e-3, 1e4, 1), (0.0, 1e4, 2)] {
+        for (f, electrons, readings) in
+            [(0.2, 1e5, 1), (5.0, 1e4, 4), (1e-3, 1e4, 1), (0.0, 1e4, 2), (2400.0, 1e15, 100)]
+        {
             let instrument = Instrument { electrons, read_noise: 20.0, readings };
             let (cos_o, draws) = (0.5, 20_000u64);
             let gain = electrons * cos_o * f64::from(readings);
@@ -111,6 +120,6 @@ mod tests {
         assert_eq!(Instrument::noiseless().read(0.37, 0.2, 1, 2), (0.37, 0.0));
         assert_eq!(Instrument::default().fault(), None);
         let wrong = Instrument { read_noise: -1.0, ..Instrument::default() };
-        assert!(wrong.fault().is_some_and(|f| f.contains("read_noise") && f.contains("-1")));
+        assert!(wrong.fault().is_some_and(|f| f.contains("read_noise") && f.contains("-1e0")));
     }
 }

@@ -83,8 +83,8 @@ impl fmt::Display for Scan {
     }
 }
 
-/// Most entries a scan may have: 64 million pairs are 3 GB of directions.
-const MOST: f64 = 64e6;
+/// Most entries a scan may have: 16 million pairs with three channels take about 2.5 GB.
+const MOST: f64 = 16e6;
 
 impl Scan {
     /// Flat world or space.
@@ -97,7 +97,7 @@ impl Scan {
         }
     }
 
-    /// The pairs of directions and what each stands for; `None` where the step asks for more than 64 million.
+    /// The pairs of directions and what each stands for; `None` where the step asks for more than 16 million.
     #[must_use]
     pub fn directions(&self) -> Option<(Directions, Weights)> {
         match self {

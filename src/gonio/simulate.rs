@@ -34,6 +34,9 @@ pub fn simulate(
             let len = range.len();
             let (mut values, mut sigma) = (vec![f64::NAN; len * width], vec![f64::NAN; len * width]);
             let mut f = vec![0.0; width];
+            if control.stop.requested() {
+                return (values, sigma); // not measured
+            }
             for (slot, i) in range.enumerate() {
                 let (wi, wo) = directions.pair(i);
                 if wi.z > 0.0 && wo.z > 0.0 && truth(wi, wo, &mut f) {
@@ -51,7 +54,10 @@ pub fn simulate(
     let values = join_planes(width, &blocks, |b| &b.0);
     let marked = values.iter().filter(|v| v.is_nan()).count() as u64;
     let sigma = instrument.is_noisy().then(|| join_planes(width, &blocks, |b| &b.1));
+    let stopped = control.stop.requested();
+    let notes = stopped.then(|| "stopped before the scan's end: the rest was not measured".to_owned());
     Some(Measurement {
+        notes: notes.into_iter().collect(),
         origin: format!("simulated, scan {scan}, seed {seed}"),
         dimension: scan.dimension(),
         weights,

@@ -7,6 +7,12 @@ pub fn sqrt_nonneg(x: f64) -> f64 {
     x.clamp(0.0, f64::INFINITY).sqrt() // clamp keeps NaN; max(0.0) would hide it
 }
 
+/// The larger of two values; NaN wins, where `f64::max` would hide it.
+#[must_use]
+pub fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
+}
+
 /// a·b − c·d with one rounding error of the result instead of a cancellation (Kahan; Jeannerod, Louvet, Muller 2013).
 #[must_use]
 pub fn diff_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
@@ -108,5 +114,7 @@ mod tests {
         assert_eq!(sqrt_nonneg(-1e-17), 0.0);
         assert_eq!(sqrt_nonneg(4.0), 2.0);
         assert!(sqrt_nonneg(f64::NAN).is_nan());
+        assert!(larger(f64::NAN, 1.0).is_nan() && larger(1.0, f64::NAN).is_nan());
+        assert_eq!(larger(1.0, 2.0), 2.0);
     }
 }
