@@ -68,8 +68,13 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
 /// The best minimum that the solver reaches from the promising starts.
 fn search(problem: &varpro::Profile<'_>, options: &FitOptions) -> Result<solver::Outcome, FitError> {
     let lm = solver::LevenbergMarquardt::bounded(problem.bounds());
+    let mut starts = start::starts(problem);
+    if let Some(smaller) = problem.without_last_shape() {
+        // A lobe more can only help: from the smaller model's optimum the larger one never ends above it.
+        starts.push(start::extended(problem, &search(&smaller, options)?.t)?);
+    }
     let mut best: Option<solver::Outcome> = None;
-    for start in start::starts(problem) {
+    for start in starts {
         let outcome = solver::minimize(problem, lm.clone(), DVector::from_vec(start), options.max_iterations)
             .map_err(|e| FitError::Solver { reason: e.to_string() })?;
         if best.as_ref().is_none_or(|b| outcome.cost < b.cost) {

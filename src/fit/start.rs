@@ -3,8 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::nnls;
+use super::options::FitError;
 use super::passes::{basis, dot};
 use super::samples::Samples;
+use super::solver::Linearize;
 use super::varpro::Profile;
 use crate::brdf::LobeKind;
 use crate::brdf::lobe::octave;
@@ -25,6 +27,26 @@ pub(super) fn starts(problem: &Profile<'_>) -> Vec<Vec<f64>> {
         1 => single(problem),
         many => several(problem, many),
     }
+}
+
+/// A smaller model's optimum with one lobe more, where that lobe helps most among shapes an octave apart.
+pub(super) fn extended(problem: &Profile<'_>, smaller: &DVector<f64>) -> Result<Vec<f64>, FitError> {
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for node in nodes(problem) {
+        let t = smaller.push(node.ln());
+        let cost = problem.cost(&t).map_err(|e| FitError::Solver { reason: e.to_string() })?;
+        if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
+            best = Some((cost, t.as_slice().to_vec()));
+        }
+    }
+    best.map(|(_, t)| t).ok_or_else(|| FitError::Solver { reason: "no start".into() })
+}
+
+/// Shapes an octave apart over the range that is searched.
+fn nodes(problem: &Profile<'_>) -> Vec<f64> {
+    let (low, high) = problem.layout[0].1.bounds;
+    let octaves = (high / low).log2().floor() as usize + 1;
+    (0..octaves).map(|k| octave(low, k)).collect()
 }
 
 /// Sums over the lattice: column 0 … base−1 the lobes without a shape, then one column a node, then one slope a node.
@@ -143,9 +165,8 @@ fn several(problem: &Profile<'_>, lobes: usize) -> Vec<Vec<f64>> {
 
 /// One pass over the samples for the whole lattice; `pairs` also sums products of different nodes.
 fn tabulate(problem: &Profile<'_>, pairs: bool) -> Lattice {
-    let (low, high) = problem.layout[0].1.bounds;
-    let octaves = (high / low).log2().floor() as usize + 1;
-    let t: Vec<f64> = (0..octaves).map(|k| octave(low, k).ln()).collect();
+    let low = problem.layout[0].1.bounds.0;
+    let t: Vec<f64> = nodes(problem).into_iter().map(f64::ln).collect();
     let plain: Vec<_> = problem.kinds.iter().filter(|k| k.lobe().parameters().is_empty()).copied().collect();
     let shaped = problem.kinds[problem.layout[0].0];
     let samples = problem.samples;
@@ -159,7 +180,7 @@ fn tabulate(problem: &Profile<'_>, pairs: bool) -> Lattice {
         samples.len(),
         zero.clone(),
         |block| {
-            let columns = lattice_columns(samples, &plain, (shaped, low, octaves), !pairs, block.clone());
+            let columns = lattice_columns(samples, &plain, (shaped, low, t.len()), !pairs, block.clone());
             let (mut gram, mut data, mut energy) = zero.clone();
             let g = &samples.slope[block.clone()];
             for c in 0..samples.data.len() {

@@ -43,6 +43,15 @@ impl<'a> Profile<'a> {
         Self { samples, kinds, layout }
     }
 
+    /// The problem with one shaped lobe fewer; `None` where there is but one.
+    pub fn without_last_shape(&self) -> Option<Self> {
+        let mut layout = self.layout.clone();
+        let (last, _) = layout.pop()?;
+        let mut kinds = self.kinds.clone();
+        kinds.remove(last);
+        (!layout.is_empty()).then_some(Self { samples: self.samples, kinds, layout })
+    }
+
     /// Bounds of t.
     pub fn bounds(&self) -> Vec<(f64, f64)> {
         self.layout.iter().map(|(_, p)| (p.bounds.0.ln(), p.bounds.1.ln())).collect()
