@@ -1,6 +1,6 @@
 //! Rendering a material in a scene.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::error::ChainError;
 use super::source::{load, render_material};
@@ -26,15 +26,6 @@ impl Stage {
     /// [`ChainError`], listing the names that there are.
     pub fn built_in(name: &str) -> Result<Self, ChainError> {
         Ok(Self { spec: builtin(name)?, base: PathBuf::new() })
-    }
-
-    /// The scene in a file.
-    ///
-    /// # Errors
-    /// [`ChainError`] naming the place.
-    pub fn read(path: &Path) -> Result<Self, ChainError> {
-        let base = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Ok(Self { spec: SceneSpec::read(path)?, base })
     }
 }
 

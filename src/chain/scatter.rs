@@ -20,6 +20,9 @@ pub struct Scatter {
 /// Incidences looked at on a grid that has its own everywhere.
 const INCIDENCES_DEG: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 
+/// Incidences above this are left out, degrees: f grows like 1/cosθ there, and few tables are good for it.
+const GRAZING_DEG: f64 = 85.0;
+
 /// Integrated scatter at the table's own incidences (at most 8 of them, evenly picked), or every 15° on a grid.
 ///
 /// # Errors
@@ -39,5 +42,5 @@ pub fn integrated_scatter(table: &Measurement) -> Result<Vec<Scatter>, String> {
         let albedo = brdf.directional_albedo(direction(theta_deg.to_radians(), 0.0));
         Scatter { theta_i_deg: *theta_deg, scatter: albedo.per_channel, covered: albedo.covered }
     };
-    Ok(own.iter().step_by(step).filter(|t| **t < 90.0).map(at).collect())
+    Ok(own.iter().step_by(step).filter(|t| **t <= GRAZING_DEG).map(at).collect())
 }

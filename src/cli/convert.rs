@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::{check_folder, output_format, write_measurement};
+use super::output::{check_folder, output_format, stdout_is_free, write_measurement};
 use super::simulate::parse_scan;
 use super::ui::Ui;
 use crate::chain::{self, Source};
@@ -49,6 +49,7 @@ fn merl_grid(angles: MerlAngles) -> Scan {
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let format = output_format(&args.out, args.to)?;
     check_folder(&args.out)?;
+    stdout_is_free(&args.out, ui)?;
     let options = args.reading.options();
     let table = match chain::load(&args.input, &options)? {
         Source::Measured(table) => {

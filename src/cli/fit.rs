@@ -31,7 +31,7 @@ pub(super) struct Args {
     #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform")]
     weights: WeightMode,
     /// Leave out samples with θi or θo above this, degrees
-    #[arg(long, default_value_t = 80.0, value_name = "DEG")]
+    #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true)]
     max_angle: f64,
     /// Where to write the fit of one measurement; `-` is stdout
     #[arg(long, value_name = "FIT.json", conflicts_with = "out_dir")]

@@ -113,9 +113,14 @@ fn describe(s: &Summary, scatter: &Result<Vec<Scatter>, String>) -> String {
     }
     match scatter {
         Ok(list) => {
+            let names: Vec<String> = s.channels.iter().map(|c| format!("{:>8}", c.name)).collect();
+            let _ = writeln!(t, "  scatter       ∫ f cosθo dωo over what was measured  {}", names.join(" "));
             for row in list {
-                let values: Vec<String> = row.scatter.iter().map(|v| format!("{v:.4}")).collect();
-                let _ = writeln!(t, "  scatter       θi {:>5.1}°  {}", row.theta_i_deg, values.join("  "));
+                let values: Vec<String> = row.scatter.iter().map(|v| format!("{v:>8.4}")).collect();
+                let covered = 100.0 * row.covered;
+                let (theta, values) = (row.theta_i_deg, values.join(" "));
+                let _ =
+                    writeln!(t, "                θi {theta:>5.1}°, {covered:>5.1} % of the hemisphere        {values}");
             }
         }
         Err(reason) => {

@@ -8,6 +8,21 @@ use super::ui::Ui;
 use crate::control::write_whole;
 use crate::measurement::{Format, Measurement, MeasurementError, formats};
 
+/// `--json` and an output on stdout exclude each other: only one of them can have stdout.
+pub(super) fn stdout_is_free(out: &Path, ui: &Ui) -> Result<(), Failure> {
+    if out == Path::new("-") && ui.is_json() {
+        return Err(Failure::usage("--json: stdout is taken by --out -; write to a file"));
+    }
+    Ok(())
+}
+
+/// The text of a file; `-` is stdin.
+pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
+    let read =
+        if path == Path::new("-") { io::read_to_string(io::stdin().lock()) } else { std::fs::read_to_string(path) };
+    read.map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
+}
+
 /// Writes a text file whole, or to stdout for `-` (where a closed pipe is no error).
 pub(super) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_bytes(path, text.as_bytes())

@@ -1,22 +1,22 @@
 //! `goniofit render`: one picture.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{check_folder, write_bytes};
+use super::output::{check_folder, read_text, stdout_is_free, write_bytes};
 use super::ui::{self, Ui};
 use crate::chain::{self, Stage};
 use crate::image::{Image, develop, encode_exr, encode_png, exposure_for};
-use crate::render::Options;
+use crate::render::{Options, SceneSpec};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit render --scene sphere-on-plane --material gold.json --out gold.exr --png gold.png
   goniofit render my-scene.toml --samples 256 --out picture.exr")]
 pub(super) struct Args {
-    /// A scene file
+    /// A scene file; `-` is stdin
     #[arg(value_name = "SCENE.toml", conflicts_with = "scene")]
     file: Option<PathBuf>,
     #[command(flatten)]
@@ -91,15 +91,15 @@ impl PictureArgs {
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let stage = match &args.file {
-        Some(path) => Stage::read(path)?,
+        Some(path) => read_stage(path)?,
         None => args.picture.stage()?,
     };
+    check_extension(&args.out, "exr", "--out")?;
     check_folder(&args.out)?;
+    stdout_is_free(&args.out, ui)?;
     if let Some(png) = &args.png {
+        check_extension(png, "png", "--png")?;
         check_folder(png)?;
-        if png == &args.out {
-            return Err(Failure::usage("--png and --out name the same file"));
-        }
     }
     let options = args.picture.options(&stage);
     let image = match &args.material {
@@ -135,6 +135,28 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     });
     ui.result(&text, &object);
     Ok(())
+}
+
+/// The scene in a file, `-` being stdin.
+fn read_stage(path: &Path) -> Result<Stage, Failure> {
+    let base = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let spec =
+        SceneSpec::parse(&read_text(path)?, &path.display().to_string()).map_err(|e| match path.extension() {
+            Some(extension) if extension != "toml" => Failure::usage(format!(
+                "{e}\n(SCENE.toml describes a scene; a measurement or fit goes with --material)"
+            )),
+            _ => e.into(),
+        })?;
+    Ok(Stage { spec, base })
+}
+
+/// What a picture is written as follows from the option, so another extension is a mistake.
+fn check_extension(path: &Path, wanted: &str, option: &str) -> Result<(), Failure> {
+    let right = path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted));
+    if right || path == Path::new("-") {
+        return Ok(());
+    }
+    Err(Failure::usage(format!("{option}: expected a name that ends in .{wanted}, found {}", path.display())))
 }
 
 fn unknown_share(image: &Image) -> f64 {

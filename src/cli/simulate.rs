@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{check_folder, output_format, write_measurement};
+use super::output::{check_folder, output_format, read_text, stdout_is_free, write_measurement};
 use super::ui::Ui;
 use crate::chain;
 use crate::gonio::{Instrument, Scan, SimulationSpec};
@@ -16,7 +16,7 @@ use crate::measurement::{ReadOptions, formats};
   goniofit simulate --material glossy-paint --scan hemisphere:5 --seed 1 --out paint.csv
   goniofit simulate --material gold.json --scan merl --noiseless --out gold.binary")]
 pub(super) struct Args {
-    /// A simulation file; options given beside it replace what it says
+    /// A simulation file (`-` is stdin); options given beside it replace what it says
     spec: Option<PathBuf>,
     /// The truth: a built-in material (see `goniofit models`), a fitted .json or a measurement
     #[arg(long, value_name = "M")]
@@ -28,11 +28,11 @@ pub(super) struct Args {
     /// Seed of the noise [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Photoelectrons in a reading of 1/sr at cosθo = 1 [default: 100000]
-    #[arg(long, value_name = "E")]
+    /// Photoelectrons in a reading of 1/sr at cosθo = 1 [default: 100000]; 0 is a detector without any noise
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
     electrons: Option<f64>,
     /// Read noise, electrons [default: 10]
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
     read_noise: Option<f64>,
     /// Readings averaged at each pair of directions [default: 1]
     #[arg(long, value_name = "N")]
@@ -48,6 +48,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let format = output_format(&args.out, None)?;
     check_folder(&args.out)?;
+    stdout_is_free(&args.out, ui)?;
     let plan = Plan::new(args)?;
     let source = chain::load(&plan.material, &ReadOptions::default())?;
     let name = Path::new(&plan.material).file_stem().map_or("simulated".into(), |s| s.to_string_lossy());
@@ -116,8 +117,7 @@ impl Plan {
 
 fn read_spec(path: &Path) -> Result<SimulationSpec, Failure> {
     let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("{}: {e}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(&e))?;
-    SimulationSpec::from_toml(&text).map_err(|e| wrong(&e))
+    SimulationSpec::from_toml(&read_text(path)?).map_err(|e| wrong(&e))
 }
 
 /// A file that a simulation file names stands beside it; a built-in material's name stays.

@@ -41,6 +41,11 @@ impl Ui {
         Self { json, quiet, bar: Bar { shown, current: Mutex::new(None) } }
     }
 
+    /// Whether stdout holds one JSON object and nothing else.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// Progress on a terminal, and the wish to stop.
     pub fn control(&self) -> Control<'_> {
         Control { progress: &self.bar, stop: &STOP }
