@@ -3,6 +3,9 @@
 
 mod bench;
 mod chain;
+mod failures;
 mod fit_file;
 mod fit_options;
+mod help;
+mod json;
 mod merl;
