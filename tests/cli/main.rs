@@ -7,5 +7,10 @@ mod failures;
 mod fit_file;
 mod fit_options;
 mod help;
+#[cfg(unix)]
+mod interrupt;
 mod json;
 mod merl;
+mod outputs;
+mod streams;
+mod threads;
