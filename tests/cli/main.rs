@@ -10,7 +10,10 @@ mod help;
 #[cfg(unix)]
 mod interrupt;
 mod json;
+mod materials;
 mod merl;
 mod outputs;
+mod real_files;
+mod scenes;
 mod streams;
 mod threads;
