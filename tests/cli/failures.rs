@@ -101,3 +101,12 @@ fn two_measurements_of_one_name_are_refused_before_anything_is_written() {
     assert!(ran.err.contains("p.json"), "{}", ran.err);
     assert!(!b.path("f").exists() || b.list("f").is_empty());
 }
+
+#[test]
+fn a_batch_that_fails_prints_one_json_object_with_the_reason() {
+    let b = Bench::new();
+    b.paint("good.csv");
+    let ran = b.run(&["fit", "good.csv", "missing.csv", "--out-dir", "f", "--json"]);
+    assert_eq!(ran.code, Some(2));
+    assert!(ran.json()["error"].to_string().contains("missing.csv"), "{}", ran.text());
+}

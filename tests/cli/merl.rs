@@ -49,6 +49,15 @@ fn a_noiseless_merl_table_gives_its_material_back() {
 }
 
 #[test]
+fn a_fit_sampled_at_either_place_of_the_bin_is_found_again_there() {
+    let b = Bench::new();
+    b.write("satin.json", b.ok(&["models", "satin"]).out);
+    b.ok(&["convert", "satin.json", "edge.binary", "--merl-angles", "edge"]);
+    let fit = b.json(&["fit", "edge.binary", "--merl-angles", "edge"]);
+    assert!((exponent(&fit) / 12.0 - 1.0).abs() < 1e-9, "{}", exponent(&fit));
+}
+
+#[test]
 fn readings_that_noise_made_negative_are_told_and_counted() {
     let b = Bench::new();
     let args =

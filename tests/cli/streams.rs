@@ -113,3 +113,23 @@ fn a_closed_pipe_does_not_hide_that_the_work_failed() {
     let status = b.command(&["fit", "broken.csv", "--json"]).stdout(writer).status().expect("runs");
     assert_eq!(status.code(), Some(2));
 }
+
+#[test]
+fn a_picture_on_stdout_is_alone_there() {
+    let b = Bench::new();
+    let small = ["--size", "16", "--samples", "2"];
+    let exr = b.ok(&[&["render", "--out", "-"], &small[..]].concat()).out;
+    assert!(exr.starts_with(&[0x76, 0x2f, 0x31, 0x01]), "OpenEXR's mark");
+    let png = b.ok(&[&["render", "--out", "x.exr", "--png", "-"], &small[..]].concat()).out;
+    assert!(png.starts_with(b"\x89PNG") && png.ends_with(b"IEND\xae\x42\x60\x82"), "{} bytes", png.len());
+    let told = b"samples a pixel";
+    assert!(!exr.windows(told.len()).any(|w| w == told), "the result in words follows the picture");
+}
+
+#[test]
+fn a_fit_from_stdin_is_named_stdin_in_a_folder() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    assert_eq!(b.run_on(&["fit", "-", "--out-dir", "f"], &b.bytes("p.csv")).code, Some(0));
+    assert_eq!(b.list("f"), ["stdin.json"]);
+}
