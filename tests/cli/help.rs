@@ -1,0 +1,68 @@
+//! Help: every command has one, with an example that its parser accepts.
+
+use crate::bench::Bench;
+
+fn commands(b: &Bench) -> Vec<String> {
+    let text = b.ok(&["--help"]).text();
+    let list = text.split("Commands:").nth(1).expect("a list of commands");
+    let names = list.lines().skip(1).take_while(|l| !l.trim().is_empty()).filter_map(|l| {
+        let continued = l.starts_with("    "); // the wrapped rest of a summary
+        l.split_whitespace().next().filter(|_| !continued).map(str::to_owned)
+    });
+    names.filter(|n| n != "help").collect()
+}
+
+/// The command lines under `Example:`.
+fn examples(help: &str) -> Vec<Vec<String>> {
+    let lines = help.lines().skip_while(|l| !l.starts_with("Example")).skip(1);
+    let typed = lines.filter_map(|l| l.trim().strip_prefix("goniofit "));
+    typed.map(|l| l.split('>').next().unwrap_or(l).split_whitespace().map(str::to_owned).collect()).collect()
+}
+
+#[test]
+fn help_lists_the_ten_commands() {
+    let found = commands(&Bench::new());
+    let expected = ["demo", "simulate", "info", "fit", "render", "validate", "compare", "convert", "models", "scenes"];
+    for name in expected {
+        assert!(found.iter().any(|f| f == name), "{name} is missing of {found:?}");
+    }
+}
+
+#[test]
+fn the_help_of_every_command_has_an_example_that_its_parser_accepts() {
+    let b = Bench::new();
+    for name in commands(&b) {
+        let ran = b.ok(&[&name, "--help"]);
+        assert!(ran.err.is_empty(), "{name}: help belongs on stdout");
+        let examples = examples(&ran.text());
+        assert!(!examples.is_empty(), "{name} has no example:\n{}", ran.text());
+        for example in examples {
+            assert_eq!(example[0], name, "{example:?}");
+            if name == "demo" {
+                continue; // runs for long with its defaults
+            }
+            // The files are not there, which is all that may be wrong.
+            let args: Vec<&str> = example.iter().map(String::as_str).collect();
+            let ran = b.run(&args);
+            let misread = ["Usage:", "unexpected argument", "invalid value"].iter().any(|s| ran.err.contains(s));
+            assert!(!misread, "{example:?}: {}", ran.err);
+        }
+    }
+}
+
+#[test]
+fn every_command_knows_json_quiet_and_threads() {
+    let b = Bench::new();
+    for name in commands(&b) {
+        let help = b.ok(&[&name, "--help"]).text();
+        for option in ["--json", "--quiet", "--threads"] {
+            assert!(help.contains(option), "{name} lacks {option}");
+        }
+    }
+}
+
+#[test]
+fn the_version_is_the_crates() {
+    let said = Bench::new().ok(&["--version"]).text();
+    assert_eq!(said.trim(), concat!("goniofit ", env!("CARGO_PKG_VERSION")));
+}

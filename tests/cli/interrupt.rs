@@ -1,0 +1,76 @@
+//! Ctrl-C stops long work with the best so far written, and exits 130.
+
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::bench::{Bench, number};
+
+/// Waits until the process handles SIGINT itself; where the system does not tell, long enough.
+fn wait_for_handler(child: &Child) {
+    let status = format!("/proc/{}/status", child.id());
+    let deadline = Instant::now() + Duration::from_secs(20);
+    while Instant::now() < deadline {
+        let Ok(text) = std::fs::read_to_string(&status) else {
+            std::thread::sleep(Duration::from_secs(2));
+            return;
+        };
+        let mask = text.lines().find_map(|l| l.strip_prefix("SigCgt:")).map(str::trim).unwrap_or_default();
+        // Bit 1 stands for signal 2, SIGINT.
+        if u64::from_str_radix(mask, 16).is_ok_and(|m| m & 2 != 0) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    panic!("no handler for SIGINT was installed");
+}
+
+/// Runs a command, interrupts it `after` its handler stands, and returns exit code, stdout and stderr.
+fn interrupted(b: &Bench, args: &[&str], after: Duration) -> (Option<i32>, Vec<u8>, String) {
+    let mut child = b.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("starts");
+    wait_for_handler(&child);
+    std::thread::sleep(after);
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(sent.success());
+    let asked = Instant::now();
+    while child.try_wait().expect("waits").is_none() {
+        if asked.elapsed() > Duration::from_secs(30) {
+            child.kill().expect("ends");
+            panic!("{args:?} did not stop");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = child.wait_with_output().expect("ends");
+    (output.status.code(), output.stdout, String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn an_interrupted_render_leaves_the_picture_so_far() {
+    let b = Bench::new();
+    let asked = 10_000_000;
+    let samples = asked.to_string();
+    for (k, delay) in [0, 300].into_iter().enumerate() {
+        let (exr, png) = (format!("{k}.exr"), format!("{k}.png"));
+        let args = ["render", "--size", "32", "--samples", &samples, "--json", "--out", &exr, "--png", &png];
+        let (code, out, err) = interrupted(&b, &args, Duration::from_millis(delay));
+        assert_eq!(code, Some(130), "{err}");
+        assert!(err.contains("stopped"), "{err}");
+        let said: serde_json::Value = serde_json::from_slice(&out).expect("one object");
+        let taken = number(&said["samples"]);
+        assert!((0.0..f64::from(asked)).contains(&taken), "{taken} samples after {delay} ms");
+        let image = b.exr(&exr);
+        assert_eq!((image.width, image.height), (32, 32));
+        assert!(image.radiance.iter().flatten().all(|v| v.is_finite()), "after {delay} ms");
+        assert!(b.path(&png).is_file());
+    }
+    assert_eq!(b.list(".").len(), 4, "no temporary files stay: {:?}", b.list("."));
+}
+
+#[test]
+fn an_interrupted_demo_still_writes_every_file() {
+    let b = Bench::new();
+    let args = ["demo", "--size", "64", "--samples", "1000000", "--out", "d"];
+    let (code, _, err) = interrupted(&b, &args, Duration::from_millis(200));
+    assert_eq!(code, Some(130), "{err}");
+    assert!(err.contains("stopped"), "{err}");
+    assert_eq!(b.list("d").len(), 15, "{:?}", b.list("d"));
+}

@@ -1,0 +1,19 @@
+//! The `goniofit` command as a user meets it: files, streams, exit codes. The contract is the command line, not the library.
+#![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)] // helpers of tests
+
+mod bench;
+mod chain;
+mod failures;
+mod fit_file;
+mod fit_options;
+mod help;
+#[cfg(unix)]
+mod interrupt;
+mod json;
+mod materials;
+mod merl;
+mod outputs;
+mod real_files;
+mod scenes;
+mod streams;
+mod threads;

@@ -1,0 +1,55 @@
+//! Built-in scenes, printed as files to start from.
+
+use crate::bench::{Bench, assert_same_picture};
+
+#[test]
+fn a_scene_printed_to_a_file_renders_as_the_built_in_one() {
+    let b = Bench::new();
+    let list = b.json(&["scenes"]);
+    let scenes: Vec<&str> =
+        list["scenes"].as_array().expect("a list").iter().map(|s| s["name"].as_str().expect("a name")).collect();
+    for name in ["sphere", "sphere-on-plane", "cornell"] {
+        assert!(scenes.contains(&name), "{scenes:?}");
+    }
+    for name in scenes {
+        let file = format!("{name}.toml");
+        b.write(&file, b.ok(&["scenes", name, "--toml"]).out);
+        for (out, scene) in [("file.exr", vec![file.as_str()]), ("name.exr", vec!["--scene", name])] {
+            for material in [vec![], vec!["--material", "satin"]] {
+                let ran = b.picture(&format!("{}{out}", material.len()), &[&scene[..], &material].concat());
+                assert_eq!(ran.code, Some(0), "{scene:?}: {}", ran.err);
+            }
+        }
+        for prefix in ["0", "2"] {
+            let of = |out: &str| b.exr(&format!("{prefix}{out}"));
+            assert_same_picture(&of("file.exr"), &of("name.exr"), name);
+        }
+        assert!(b.exr("0name.exr").radiance != b.exr("2name.exr").radiance, "{name}: the material is replaced");
+    }
+}
+
+#[test]
+fn a_scene_is_either_a_file_or_a_name() {
+    let b = Bench::new();
+    b.write("s.toml", b.ok(&["scenes", "sphere", "--toml"]).out);
+    assert_eq!(b.picture("x.exr", &["s.toml", "--scene", "sphere"]).code, Some(2));
+    b.write("n.toml", b.text("s.toml").replace("version = 1", "version = 2"));
+    let newer = b.picture("x.exr", &["n.toml"]);
+    assert_eq!(newer.code, Some(2));
+    assert!(newer.err.contains("n.toml") && newer.err.contains("version"), "{}", newer.err);
+    assert!(!b.path("x.exr").exists());
+}
+
+#[test]
+fn size_samples_and_seed_are_what_was_asked_for() {
+    let b = Bench::new();
+    let said = b.json(&["render", "--size", "20x10", "--samples", "3", "--seed", "7", "--out", "r.exr"]);
+    let image = b.exr("r.exr");
+    assert_eq!((image.width, image.height), (20, 10));
+    assert_eq!((image.metadata.samples, image.metadata.seed), (Some(3), Some(7)));
+    for (key, want) in [("width", 20), ("height", 10), ("samples", 3), ("seed", 7)] {
+        assert_eq!(said[key], want, "{key}");
+    }
+    b.ok(&["render", "--size", "20x10", "--samples", "3", "--seed", "8", "--out", "other.exr"]);
+    assert!(b.exr("other.exr").radiance != image.radiance, "another seed, other noise");
+}
