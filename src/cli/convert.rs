@@ -61,7 +61,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         Source::Fitted(material) => {
             let flat = material.is_flat();
             let scan = match &args.scan {
-                Some(text) => parse_scan(text)?,
+                Some(text) => match parse_scan(text)? {
+                    Scan::Merl => merl_grid(options.merl_angles),
+                    other => other,
+                },
                 None if format == Format::Merl => merl_grid(options.merl_angles),
                 None if flat => Scan::Flat { step_deg: 1.0 },
                 None => Scan::Hemisphere { step_deg: 5.0 },

@@ -98,6 +98,7 @@ pub fn main() -> ExitCode {
     }
     let ui = Ui::new(cli.global.json, cli.global.quiet);
     match run(cli.command, &ui) {
+        Ok(()) if ui::lost_output() => ExitCode::from(1),
         Ok(()) if ui::stop().requested() => ExitCode::from(130),
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => ui::report_failure(&failure, cli.global.json),

@@ -100,6 +100,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     if let Some(png) = &args.png {
         check_extension(png, "png", "--png")?;
         check_folder(png)?;
+        stdout_is_free(png, ui)?;
     }
     let options = args.picture.options(&stage);
     let image = match &args.material {
@@ -133,7 +134,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         "out": args.out, "png": args.png, "scene": stage.spec.name, "width": image.width, "height": image.height,
         "samples": samples, "seconds": seconds, "seed": options.seed, "unmeasured_share": unknown, "mean": mean(&image),
     });
-    ui.result(&text, &object);
+    let taken = [Some(&args.out), args.png.as_ref()].into_iter().flatten().any(|p| p.as_os_str() == "-");
+    if !taken {
+        ui.result(&text, &object);
+    }
     Ok(())
 }
 
@@ -153,7 +157,8 @@ fn read_stage(path: &Path) -> Result<Stage, Failure> {
 /// What a picture is written as follows from the option, so another extension is a mistake.
 fn check_extension(path: &Path, wanted: &str, option: &str) -> Result<(), Failure> {
     let right = path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted));
-    if right || path == Path::new("-") {
+    let device = std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
+    if right || device || path == Path::new("-") {
         return Ok(());
     }
     Err(Failure::usage(format!("{option}: expected a name that ends in .{wanted}, found {}", path.display())))

@@ -3,6 +3,7 @@
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -11,17 +12,27 @@ use super::failure::Failure;
 use crate::control::{Control, Progress, Stop};
 
 static STOP: Stop = Stop::new();
+/// Whether work runs that can be stopped with something to show for it.
+static WORKING: AtomicBool = AtomicBool::new(false);
+/// Whether stdout refused a result, for another reason than a closed pipe.
+static LOST: AtomicBool = AtomicBool::new(false);
+
+/// Whether a result could not be printed.
+pub(super) fn lost_output() -> bool {
+    LOST.load(Ordering::Relaxed)
+}
 
 /// The flag that Ctrl-C raises.
 pub(super) fn stop() -> &'static Stop {
     &STOP
 }
 
-/// Ctrl-C asks the work to stop with the best so far; a second one ends the process at once.
+/// Ctrl-C asks the work to stop with the best so far; a second one, or one while there is nothing to keep, ends the process at
+/// once.
 pub(super) fn install_stop() {
     // Without a handler Ctrl-C ends the process at once, which is no reason not to work.
     let _ = ctrlc::set_handler(|| {
-        if STOP.requested() {
+        if STOP.requested() || !WORKING.load(Ordering::Relaxed) {
             std::process::exit(130);
         }
         STOP.request();
@@ -48,6 +59,7 @@ impl Ui {
 
     /// Progress on a terminal, and the wish to stop.
     pub fn control(&self) -> Control<'_> {
+        WORKING.store(true, Ordering::Relaxed);
         Control { progress: &self.bar, stop: &STOP }
     }
 
@@ -81,20 +93,26 @@ fn print_aside(text: &str) {
 /// Prints a line on stdout; a closed pipe is no error.
 fn print_line(text: &str) {
     let mut out = std::io::stdout().lock();
-    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            LOST.store(true, Ordering::Relaxed);
+            print_aside(&format!("error: stdout: {e}"));
+        }
+        _ => {}
+    }
 }
 
 /// Says why a command failed, as `{"error": …}` on stdout or as text on stderr.
 pub(super) fn report_failure(failure: &Failure, json: bool) -> ExitCode {
+    let message = failure.message.strip_prefix("error: ").unwrap_or(&failure.message);
     if json {
         let mut object = failure.found.as_ref().map_or_else(|| serde_json::json!({}), |found| found.1.clone());
-        object["error"] = failure.message.as_str().into();
+        object["error"] = message.into();
         print_line(&object.to_string());
     } else {
         if let Some(found) = &failure.found {
             print_line(found.0.trim_end());
         }
-        let message = failure.message.strip_prefix("error: ").unwrap_or(&failure.message);
         print_aside(&format!("error: {message}"));
     }
     ExitCode::from(failure.code)

@@ -12,10 +12,8 @@ use super::render::PictureArgs;
 use super::ui::{self, Ui};
 use crate::brdf::Material;
 use crate::chain::{self, Shown, Source, Stage};
-use crate::control::Control;
-use crate::image::Image;
 use crate::measurement::formats;
-use crate::render::Options;
+use crate::render::{Material as Subject, Options};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  goniofit validate gold.binary gold.json --scene sphere-on-plane --out gold/")]
@@ -42,30 +40,34 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     let name = table.name.clone();
     let fits = args.fits.iter().map(|f| chain::load_material(f).map(|m| (f, m))).collect::<Result<Vec<_>, _>>()?;
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::output(&args.out, &e))?;
     let options = args.picture.options(&stage);
-    let studio = Studio { stage: &stage, options, rgb: args.picture.rgb.as_ref(), control: ui.control() };
-    let reference =
-        studio.shown(0, "table", &args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)))?;
-    let mut others = Vec::new();
-    for (k, (file, material)) in fits.iter().enumerate() {
-        if ui::stop().requested() {
-            break;
-        }
-        let label = label(file, material, fits.len());
-        others.push(studio.shown(k as u64 + 1, &label, file, &Source::Fitted(Box::new(material.clone())))?);
+    let rgb = args.picture.rgb.as_ref();
+    // Everything is resolved before anything is written.
+    let measured =
+        chain::render_material(&args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)), rgb)?;
+    let mut subjects = vec![("table".to_owned(), measured)];
+    for (file, material) in &fits {
+        let source = Source::Fitted(Box::new(material.clone()));
+        subjects.push((label(file, material, fits.len()), chain::render_material(file, &source, rgb)?));
     }
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure::output(&args.out, &e))?;
+    let mut shown = Vec::new();
+    for (k, (label, subject)) in subjects.into_iter().enumerate() {
+        if !ui::stop().requested() {
+            shown.push(take(k, label, subject, &stage, &options, ui)?);
+        }
+    }
+    shown.retain(|shown| shown.image.metadata.samples != Some(0));
+    let Some((reference, others)) = shown.split_first() else {
+        return Err(Failure::work("stopped before the first picture had any sample: nothing was written"));
+    };
     let stopped = ui::stop().requested();
-    others.retain(|shown| shown.image.metadata.samples != Some(0));
     if stopped {
         ui.warn("stopped: pictures are missing or have fewer samples than asked for");
     }
-    if reference.image.metadata.samples == Some(0) {
-        return Err(Failure::work("stopped before the first picture had any sample: nothing was written"));
-    }
     let subtitle =
         format!("{} scene, {} samples a pixel", stage.spec.name, reference.image.metadata.samples.unwrap_or(0));
-    let gallery = chain::write_gallery(&args.out, &name, &subtitle, &reference, &others)?;
+    let gallery = chain::write_gallery(&args.out, &name, &subtitle, reference, others)?;
     let rows: Vec<_> = (fits.iter().zip(&gallery.comparisons).enumerate())
         .map(|(k, ((file, m), c))| json!({ "fit": file, "model": m.model(), "picture": format!("fit-{}.exr", k + 1), "image": c }))
         .collect();
@@ -98,21 +100,17 @@ fn label(file: &str, material: &Material, fits: usize) -> String {
     if fits == 1 { format!("fit: {}", material.model()) } else { format!("{stem}: {}", material.model()) }
 }
 
-/// Where and how the pictures are taken.
-struct Studio<'a> {
-    stage: &'a Stage,
-    options: Options,
-    rgb: Option<&'a [String; 3]>,
-    control: Control<'a>,
-}
-
-impl Studio<'_> {
-    /// The `k`-th picture; each has a seed of its own, so that their errors are independent.
-    fn shown(&self, k: u64, label: &str, name: &str, source: &Source) -> Result<Shown, Failure> {
-        let subject = chain::render_material(name, source, self.rgb)?;
-        let options = Options { seed: self.options.seed.wrapping_add(k), ..self.options };
-        let image: Image = chain::picture(self.stage, Some(subject), &options, self.control)?;
-        let file = if k == 0 { "table".into() } else { format!("fit-{k}") };
-        Ok(Shown { file, difference_file: format!("difference-{k}"), label: label.into(), image })
-    }
+/// The `k`-th picture; each has a seed of its own, so that their errors are independent.
+fn take(
+    k: usize,
+    label: String,
+    subject: Subject,
+    stage: &Stage,
+    options: &Options,
+    ui: &Ui,
+) -> Result<Shown, Failure> {
+    let options = Options { seed: options.seed.wrapping_add(k as u64), ..*options };
+    let image = chain::picture(stage, Some(subject), &options, ui.control())?;
+    let file = if k == 0 { "table".into() } else { format!("fit-{k}") };
+    Ok(Shown { file, difference_file: format!("difference-{k}"), label, image })
 }

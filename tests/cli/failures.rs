@@ -46,7 +46,8 @@ fn exit_codes_tell_wrong_input_from_failed_work() {
         let ran = b.run(args);
         assert_eq!(ran.code, Some(code), "{args:?}: {}", ran.err);
         assert!(ran.err.contains(says), "{args:?}: {} lacks {says}", ran.err);
-        if code != 0 {
+        // A comparison that misses its limit still shows its numbers.
+        if code != 0 && !says.eq("rmse") {
             assert!(ran.out.is_empty(), "{args:?}: {}", ran.text());
         }
     }
