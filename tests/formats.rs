@@ -129,6 +129,18 @@ fn quantity_and_format_can_be_overridden() {
     let table = formats::read(&path, &as_brdf).expect("valid");
     let (wi, wo) = table.directions.pair(7);
     assert!((table.value(0, 7).expect("valid") / (brdf(wi, wo) * wo.z) - 1.0).abs() < 1e-13);
+    let (merl, _) = written(&merl_table(MerlAngles::Center), Format::Merl);
+    for (quantity, refused) in [(Quantity::Brdf, false), (Quantity::BrdfCos, true)] {
+        let options = ReadOptions { quantity: Some(quantity), ..ReadOptions::default() };
+        match formats::read_bytes(Path::new("t.binary"), merl.clone(), &options) {
+            Err(error @ MeasurementError::Unsupported { .. }) if refused => {
+                assert!(
+                    error.to_string().contains("holds the BRDF by definition; read it without --quantity brdf_cos")
+                );
+            }
+            other => assert!(other.is_ok() && !refused, "{quantity:?}"),
+        }
+    }
     let as_fred = ReadOptions { format: Some(Format::Fred), ..ReadOptions::default() };
     let error = formats::read(&path, &as_fred).expect_err("not FRED").to_string();
     assert!(error.contains("expected type bsdf_data"), "{error}");

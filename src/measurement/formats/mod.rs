@@ -110,7 +110,8 @@ pub enum Quantity {
 pub struct ReadOptions {
     /// Overrides what sniffing finds.
     pub format: Option<Format>,
-    /// Overrides what the file says of its quantity (not for MERL and RGL files, whose format defines it).
+    /// Overrides what the file says of its quantity. A MERL table is the BRDF and an RGL file BRDF·cosθo by definition: the other
+    /// one is refused for them.
     pub quantity: Option<Quantity>,
     /// Where in its bin a MERL entry is read.
     pub merl_angles: MerlAngles,
