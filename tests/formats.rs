@@ -60,7 +60,9 @@ fn every_format_gives_the_same_reflectance() {
         ("view-light-dphi-intervals.alta", "ALTA text", 100, 100, 1e-13),
         ("plane-symmetrical.zemax.bsdf", "Zemax BSDF text", 741, 634, 1e-6),
         ("grid.fred.txt", "FRED BSDF text", 311, 311, 1e-9),
+        ("grid-pole-for-every-azimuth.fred.txt", "FRED BSDF text", 347, 347, 1e-9),
         ("in-plane.fred.txt", "FRED BSDF text", 34, 34, 1e-9),
+        ("in-plane-two-azimuths.fred.txt", "FRED BSDF text", 36, 36, 1e-9),
     ] {
         let table = fixture(name);
         assert_eq!((table.origin.as_str(), table.len()), (format, entries), "{name}");
@@ -159,7 +161,11 @@ fn grids_bring_their_solid_angles() {
     let up_to_85 = integral(85f64.to_radians(), &|_| true);
     // The weights carry the incidence's own cell too: ∫ sinθ dθ from 15° to 45°.
     let incidence = 15f64.to_radians().cos() - 45f64.to_radians().cos();
-    for (name, truth) in [("plane-symmetrical.zemax.bsdf", about_mirror), ("grid.fred.txt", up_to_85)] {
+    for (name, truth) in [
+        ("plane-symmetrical.zemax.bsdf", about_mirror),
+        ("grid.fred.txt", up_to_85),
+        ("grid-pole-for-every-azimuth.fred.txt", up_to_85),
+    ] {
         let table = fixture(name);
         assert!(matches!(table.weights, Weights::SolidAngle(_)), "{name}");
         let mine = (0..table.len()).filter(|&i| (table.directions.pair(i).0 - wi).length() < 1e-12);
@@ -168,7 +174,52 @@ fn grids_bring_their_solid_angles() {
         println!("{name}: {sum} for {truth}");
         assert!((sum / truth - 1.0).abs() < 0.03, "{name}: {sum} for {truth}");
     }
-    assert!(matches!(fixture("in-plane.fred.txt").weights, Weights::Uniform));
+    for name in ["in-plane.fred.txt", "in-plane-two-azimuths.fred.txt"] {
+        assert!(matches!(fixture(name).weights, Weights::Uniform), "{name}");
+    }
+}
+
+/// A FRED file of one block at 10° whose rows are these (θ, φ).
+fn fred_block(rows: impl IntoIterator<Item = (u32, u32)>) -> Measurement {
+    let rows: Vec<String> = rows.into_iter().map(|(theta, phi)| format!("{theta} {phi} 0.1\n")).collect();
+    let text = format!("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n{}", rows.concat());
+    read_bytes(text.into_bytes(), MerlAngles::Center)
+}
+
+#[test]
+fn rows_of_one_node_share_its_solid_angle() {
+    // The pole at every azimuth against the pole once: with all rows there, and with one missing.
+    for (pole, missing) in [(true, false), (true, true), (false, false), (false, true)] {
+        let ring = |theta| [0, 60, 120, 180].map(move |phi| (theta, phi));
+        let rows = (0..=80).step_by(10).flat_map(ring).filter(|row| pole || row.0 > 0 || row.1 == 0);
+        let table = fred_block(rows.filter(|row| !(missing && *row == (40, 60))));
+        let sum = |keep: &dyn Fn(f64) -> bool| -> f64 {
+            (0..table.len()).filter(|&i| keep(table.directions.pair(i).1.z)).map(|i| table.weights.get(i)).sum()
+        };
+        assert!(matches!(table.weights, Weights::SolidAngle(_)));
+        let cap = 2.0 * PI * (1.0 - 5f64.to_radians().cos());
+        assert!((sum(&|z| z > 0.999) / cap - 1.0).abs() < 1e-12, "pole {pole}, missing {missing}");
+        if !missing {
+            assert!((sum(&|_| true) / (2.0 * PI * (1.0 - 85f64.to_radians().cos())) - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn azimuths_with_a_wide_gap_are_no_grid() {
+    for (azimuths, grid) in [
+        (vec![0, 180], false),
+        (vec![0, 180, 360], false),
+        (vec![0, 120, 240], false),
+        (vec![60, 90, 120], false),
+        (vec![0, 90], false),
+        (vec![45, 135], false),
+        (vec![0, 90, 180], true),
+        (vec![0, 90, 180, 270], true),
+    ] {
+        let table = fred_block((10..=80).step_by(10).flat_map(|t| azimuths.iter().map(move |&p| (t, p))));
+        assert_eq!(matches!(table.weights, Weights::SolidAngle(_)), grid, "{azimuths:?}");
+    }
 }
 
 /// A table on the MERL grid of many-digit values, some of them masked.
@@ -259,6 +310,7 @@ fn csv_keeps_everything_of_every_fixture() {
         "half-angle-cosine-rgb.alta",
         "plane-symmetrical.zemax.bsdf",
         "grid.fred.txt",
+        "grid-pole-for-every-azimuth.fred.txt",
     ] {
         let table = fixture(name);
         let back = read_bytes(written(&table, Format::Csv).0, MerlAngles::Center);
@@ -442,7 +494,7 @@ fn crlf_and_byte_order_mark_change_nothing() {
         assert_eq!((unix.channels, unix.masked, unix.notes), (windows.channels, windows.masked, windows.notes));
         files += 1;
     }
-    assert_eq!(files, 10);
+    assert_eq!(files, 12);
 }
 
 #[test]

@@ -253,7 +253,7 @@ fn text_fixtures() -> Vec<(String, Vec<u8>)> {
         |p: PathBuf| (p.file_name().expect("name").to_string_lossy().into_owned(), std::fs::read(&p).expect("bytes"));
     let mut all: Vec<_> = paths.map(read).collect();
     all.sort();
-    assert_eq!(all.len(), 10);
+    assert_eq!(all.len(), 12);
     all
 }
 
