@@ -20,6 +20,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use super::limits::{AZIMUTH_DEG, POLAR_DEG};
 use super::rows::{Divisor, Rows};
 use super::source::Source;
 use super::text::{Lines, quoted};
@@ -48,6 +49,10 @@ pub(super) fn read(source: &Source, options: &ReadOptions) -> Result<Measurement
         let numbers = line.numbers()?;
         if numbers.iter().take(2).any(|angle| !angle.is_finite()) {
             return Err(line.invalid("", "finite angles", quoted(line.text)));
+        }
+        if let &[theta_deg, phi_deg, ..] = numbers.as_slice() {
+            POLAR_DEG.check(line, || "column 1".into(), theta_deg)?;
+            AZIMUTH_DEG.check(line, || "column 2".into(), phi_deg)?;
         }
         match (numbers.as_slice(), blocks.last_mut()) {
             (&[theta_deg, phi_deg], _) => blocks.push(Block { theta_deg, phi_deg, scatter: Vec::new() }),

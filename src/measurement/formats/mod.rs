@@ -9,6 +9,7 @@ mod alta;
 mod cells;
 mod csv;
 mod fred;
+mod limits;
 mod merl;
 pub mod rgl;
 mod rows;

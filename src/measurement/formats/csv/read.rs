@@ -4,11 +4,12 @@ use glam::DVec3;
 
 use super::header::{self, Columns, Comments};
 use crate::geometry::angles::direction_deg;
+use crate::measurement::formats::limits::{AZIMUTH_DEG, FLAT_POLAR_DEG, Limit, POLAR_DEG};
 use crate::measurement::formats::rows::{Divisor, Rows, concat};
 use crate::measurement::formats::source::Source;
 use crate::measurement::formats::text::{Line, Lines, quoted};
 use crate::measurement::formats::{Quantity, ReadOptions};
-use crate::measurement::{Directions, Measurement, MeasurementError, MerlGrid, Weights};
+use crate::measurement::{Dimension, Directions, Measurement, MeasurementError, MerlGrid, Weights};
 
 /// How far (rad) a row's directions may be from the MERL grid's: wider than any rounding, narrower than any bin.
 const GRID_TOLERANCE: f64 = 1e-7;
@@ -98,19 +99,18 @@ impl<'a> Table<'a> {
         cell: &impl Fn(usize) -> &'t str,
     ) -> Result<Divisor, MeasurementError> {
         let columns = self.columns;
-        let angle = |&column: &usize| line.finite(&columns.label(column), cell(column));
-        let angles: Vec<f64> = columns.angles.iter().map(angle).collect::<Result<_, _>>()?;
+        let limits: &[Limit] = match self.comments.dimension {
+            Dimension::Space => &[POLAR_DEG, AZIMUTH_DEG, POLAR_DEG, AZIMUTH_DEG],
+            Dimension::Flat => &[FLAT_POLAR_DEG, FLAT_POLAR_DEG],
+        };
+        let angle = |(&column, limit): (&usize, &Limit)| {
+            let angle = line.finite(&columns.label(column), cell(column))?;
+            limit.check(line, || columns.label(column), angle)
+        };
+        let angles: Vec<f64> = columns.angles.iter().zip(limits).map(angle).collect::<Result<_, _>>()?;
         let (wi, wo) = match angles.as_slice() {
             [theta_i, phi_i, theta_o, phi_o] => (direction_deg(*theta_i, *phi_i), direction_deg(*theta_o, *phi_o)),
-            [theta_i, theta_o] => {
-                for (&column, theta) in columns.angles.iter().zip([theta_i, theta_o]) {
-                    if theta.abs() > 90.0 {
-                        let expected = "an angle between −90 and 90 degrees";
-                        return Err(line.invalid(&columns.label(column), expected, theta.to_string()));
-                    }
-                }
-                (direction_deg(*theta_i, 0.0), direction_deg(*theta_o, 0.0))
-            }
+            [theta_i, theta_o] => (direction_deg(*theta_i, 0.0), direction_deg(*theta_o, 0.0)),
             _ => (DVec3::NAN, DVec3::NAN),
         };
         let Some(grid) = self.comments.grid else { return Ok(self.rows.directions(wi, wo)) };
