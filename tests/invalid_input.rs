@@ -12,7 +12,7 @@ use goniofit::numeric::random::{Purpose, RngExt, stream};
 /// A file of `data-fixtures/invalid`, and what its error must say of place, expected and found.
 type Broken = (&'static str, [&'static str; 3]);
 
-const CSV: [Broken; 31] = [
+const CSV: [Broken; 34] = [
     ("csv-text-for-number.csv", ["line 3, column r", "expected a number", "found \"bright\""]),
     ("csv-text-for-angle.csv", ["line 2, column theta_o_deg", "expected a number", "found \"ten\""]),
     ("csv-extra-column.csv", ["line 3", "expected 5 cells", "found 6"]),
@@ -26,6 +26,9 @@ const CSV: [Broken; 31] = [
     ("csv-sigma-missing-for-valid-value.csv", ["line 3, column sigma_r", "expected a number", "found \"\""]),
     ("csv-sigma-for-one-channel-of-two.csv", ["line 1, header", "every channel (r, g) or for none", "sigma_r\""]),
     ("csv-common-without-number.csv", ["line 1, header", "expected common_<number>_<channel>", "found \"common_r\""]),
+    ("csv-common-leading-zero.csv", ["line 1, header", "in plain digits (1, not 01 or +1)", "found \"common_01_r\""]),
+    ("csv-common-plus-sign.csv", ["line 1, header", "in plain digits (1, not 01 or +1)", "found \"common_+1_r\""]),
+    ("csv-common-for-one-channel-of-two.csv", ["line 1, header", "every channel (r, g) or for none", "common_2_g\""]),
     ("csv-theta-out-of-range.csv", ["line 3, column theta_o_deg", "from −180 to 180 degrees", "found 1000"]),
     ("csv-phi-out-of-range.csv", ["line 2, column phi_i_deg", "from −360 to 360 degrees", "found -400"]),
     ("csv-common-not-finite.csv", ["line 2, column common_1_r", "expected a finite number", "found \"inf\""]),
@@ -334,6 +337,25 @@ fn damaged_bytes_never_panic() {
     }
     println!("{refused} refused, {read} read");
     assert!(refused > 100 && read > 100);
+}
+
+#[test]
+fn a_header_of_60_000_columns_takes_no_longer_than_its_length_calls_for() {
+    let header = |last: &str| {
+        let names = (0..30_000).flat_map(|i| [format!("c{i}"), format!("sigma_c{i}")]);
+        let names: Vec<String> = names.chain([last.to_string()]).collect();
+        format!("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,{}\n", names.join(","))
+    };
+    let error_of = |text: String| {
+        let start = std::time::Instant::now();
+        let read = formats::read_bytes(Path::new("wide.csv"), text.into_bytes(), &ReadOptions::default());
+        // Milliseconds, with room for a busy machine; comparing every name with every other took seconds.
+        assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
+        read.expect_err("refused").to_string()
+    };
+    assert!(error_of(header("weight")).contains("expected a row of data"));
+    assert!(error_of(header("c17")).contains("expected each column once, found \"c17\" twice"));
+    assert!(error_of(header("common_1_c5")).contains("c8, c9, …) or for none"));
 }
 
 #[test]

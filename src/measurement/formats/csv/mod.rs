@@ -1,7 +1,8 @@
 //! goniofit's own CSV: `#` lines, a header line, one row a pair of directions.
 //!
 //! Columns stand in any order: `theta_i_deg`, `phi_i_deg`, `theta_o_deg`, `phi_o_deg`; one per channel, under any other name, in 1/sr; `sigma_<channel>`
-//! (≥ 0, 0 is exact), for every channel or none; `common_<k>_<channel>` (1 σ, signed), component by component for every channel;
+//! (≥ 0, 0 is exact), for every channel or none; `common_<k>_<channel>` (1 σ, signed; k in plain digits), component by component
+//! for every channel;
 //! `weight` (≥ 0). An empty value is masked as not measured, `nan` and `inf` as not finite. Comments that mean something:
 //!
 //! - `# quantity: brdf` (default) or `brdf_cos`;
