@@ -119,9 +119,19 @@ fn the_flat_world_is_read_as_one() {
     for i in 0..table.len() {
         let (wi, wo) = table.directions.pair(i);
         let want = 0.1 + 0.3 * norm * mirror(wi).dot(wo).max(0.0).powi(20);
-        let value = table.value(0, i).expect("valid");
-        assert!(wi.y.abs() + wo.y.abs() < 1e-300 && (value / want - 1.0).abs() < 1e-13, "{value} for {want}");
+        assert!(wi.y.abs() + wo.y.abs() < 1e-300);
+        // θo = −90° is on the horizon.
+        let Some(value) = table.value(0, i) else {
+            assert!(wo.z == 0.0, "entry {i}");
+            continue;
+        };
+        assert!(wo.z > 0.0 && (value / want - 1.0).abs() < 1e-13, "{value} for {want}");
     }
+    assert_eq!(table.masked.marked, 3);
+    assert_eq!(table.notes, ["masked as at the horizon: 3 of the values, the first at line 3, column r"]);
+    let both = b"# dimension: 2\ntheta_i_deg,theta_o_deg,r\n90,0,0.1\n0,90,0.1\n-90,0,0.1\n0,-90,0.1\n0,89.9,0.1\n";
+    let table = read_bytes(both.to_vec(), MerlAngles::Center);
+    assert_eq!((0..5).map(|i| table.value(0, i)).collect::<Vec<_>>(), [None, None, None, None, Some(0.1)]);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! File formats, one file each. Content is sniffed; a name's extension only chooses what to write.
 //!
 //! In: a path (`-` is stdin) and [`ReadOptions`]. Out: a [`Measurement`], or a [`MeasurementError`] that names file, place, what was
-//! expected and what was found. The one decision to know: a direction at or below the horizon is no error in a listed table;
+//! expected and what was found. The one decision to know: a direction below the horizon is no error in a listed table;
 //! its values are masked, and a note says how many and where the first stands. (A table on the MERL grid keeps them: the
-//! format itself marks what is not measured.)
+//! format itself marks what is not measured.) On the horizon itself values are masked where a cosine would have to be
+//! divided out, and in the flat world.
 
 mod alta;
 mod cells;

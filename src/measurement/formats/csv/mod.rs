@@ -6,7 +6,8 @@
 //! `weight` (≥ 0). An empty value is masked as not measured, `nan` and `inf` as not finite. Comments that mean something:
 //!
 //! - `# quantity: brdf` (default) or `brdf_cos`;
-//! - `# dimension: 2`: the flat world, columns `theta_i_deg` and `theta_o_deg` in [−90, 90], values in 1/rad;
+//! - `# dimension: 2`: the flat world, columns `theta_i_deg` and `theta_o_deg` in [−90, 90], values in 1/rad, masked at ±90, where the
+//!   cosine is 0;
 //! - `# grid: merl-center` or `merl-edge`: the rows are the MERL grid's 1,458,000 entries in order, which is checked; solid angles and
 //!   grid interpolation then work as from a MERL file;
 //! - `# weights: solid-angle`: the `weight` column holds the solid angles of a grid.

@@ -63,7 +63,7 @@ impl<'a> Table<'a> {
             comments,
             columns,
             quantity,
-            rows: Rows::new(channels, quantity),
+            rows: Rows::of_world(comments.dimension, channels, quantity),
             sigma: vec![Vec::new(); columns.sigma.len()],
             common: vec![vec![Vec::new(); channels]; columns.common.len()],
             weight: Vec::new(),
@@ -178,7 +178,6 @@ impl<'a> Table<'a> {
             Some(angles) => self.rows.finish_with(name, channels, Directions::Merl(MerlGrid { angles })),
             None => self.rows.finish(name, channels),
         };
-        measurement.dimension = self.comments.dimension;
         measurement.sigma = (!self.sigma.is_empty()).then(|| concat(self.sigma));
         measurement.common = self.common.into_iter().map(concat).collect();
         measurement.weights = match (self.columns.weight, self.comments.grid) {
