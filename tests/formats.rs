@@ -232,6 +232,66 @@ fn azimuths_with_a_wide_gap_are_no_grid() {
     }
 }
 
+/// Writes `content` to a file and reads its directions.
+fn directions_of(content: &[u8]) -> Result<(Directions, Weights, Dimension), MeasurementError> {
+    let file = tempfile::NamedTempFile::new().expect("file");
+    std::fs::write(file.path(), content).expect("written");
+    formats::read_directions(file.path(), &ReadOptions::default())
+}
+
+#[test]
+fn a_list_of_directions_needs_no_values() {
+    let angles = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg";
+    let (directions, weights, dimension) =
+        directions_of(format!("{angles}\n30,0,60,180\n0,0,100,0\n").as_bytes()).expect("directions");
+    assert_eq!((directions.len(), weights, dimension), (2, Weights::Uniform, Dimension::Space));
+    assert_eq!(directions.pair(0), (direction_deg(30.0, 0.0), direction_deg(60.0, 180.0)));
+    assert!(directions.pair(1).1.z < 0.0); // kept
+    let (_, weights, _) = directions_of(format!("weight,{angles}\n2,30,0,60,180\n").as_bytes()).expect("weighted");
+    assert_eq!(weights, Weights::Column(vec![2.0]));
+    let flat = b"# dimension: 2\ntheta_i_deg,theta_o_deg\n-30,40\n10,-90\n";
+    let (directions, _, dimension) = directions_of(flat).expect("flat");
+    assert_eq!((directions.len(), dimension), (2, Dimension::Flat));
+    // A measurement serves as well.
+    for name in ["every-column-in-any-order.csv", "grid.fred.txt", "in-plane-flat-world.csv"] {
+        let table = fixture(name);
+        let (directions, weights, dimension) =
+            formats::read_directions(&fixture_path(name), &ReadOptions::default()).expect("a measurement");
+        assert_eq!((directions, weights, dimension), (table.directions, table.weights, table.dimension), "{name}");
+    }
+    // What is broken is refused as in a measurement.
+    for (content, fact) in [
+        (format!("{angles}\n"), "expected a row of data"),
+        (format!("{angles}\n0,0,1000,0\n"), "line 2, column theta_o_deg"),
+        (format!("{angles},sigma_r\n0,0,10,0,0.1\n"), "the name of a channel"),
+        ("theta_i_deg,theta_o_deg\n0,10\n".to_string(), "`# dimension: 2`"),
+    ] {
+        let error = directions_of(content.as_bytes()).expect_err("refused").to_string();
+        assert!(error.contains(fact), "{error}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_read_once_and_whole() {
+    let folder = tempfile::tempdir().expect("folder");
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo");
+    assert!(made.success());
+    let content = std::fs::read(fixture_path("masked-values.csv")).expect("bytes");
+    let writer = std::thread::spawn({
+        let (pipe, content) = (pipe.clone(), content.clone());
+        move || std::fs::write(pipe, content)
+    });
+    let bytes = formats::read_stream(&pipe).expect("readable");
+    writer.join().expect("thread").expect("written");
+    assert_eq!(bytes.as_deref(), Some(content.as_slice()));
+    let table = formats::read_bytes(&pipe, content, &ReadOptions::default()).expect("a measurement");
+    assert_eq!(table.directions, fixture("masked-values.csv").directions);
+    assert_eq!(formats::read_stream(&fixture_path("masked-values.csv")).expect("regular"), None);
+    assert!(formats::read_stream(folder.path()).is_err());
+}
+
 /// A table on the MERL grid of many-digit values, some of them masked.
 fn merl_table(angles: MerlAngles) -> Measurement {
     let mut rng = stream(17, Purpose::Study, 0);

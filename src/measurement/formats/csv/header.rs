@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use super::Needs;
 use super::{ANGLES, FLAT_ANGLES, GRIDS, SOLID_ANGLE, is_reserved};
 use crate::measurement::formats::Quantity;
 use crate::measurement::formats::text::{Line, Lines, quoted};
@@ -32,14 +33,14 @@ pub(super) struct Columns {
     pub(super) weight: Option<usize>,
 }
 
-/// Reads the `#` lines and the header.
-pub(super) fn read(lines: &mut Lines<'_>) -> Result<(Comments, Columns), MeasurementError> {
+/// Reads the `#` lines and the header, which must hold what `needs` says.
+pub(super) fn read(lines: &mut Lines<'_>, needs: Needs) -> Result<(Comments, Columns), MeasurementError> {
     let mut comments = Comments::default();
     while let Some(line) = lines.next_filled()? {
         if let Some(comment) = line.text.trim_start().strip_prefix('#') {
             comments.take(line, comment)?;
         } else {
-            let columns = Columns::parse(line, comments.dimension)?;
+            let columns = Columns::parse(line, comments.dimension, needs)?;
             return comments.check(line).map(|()| (comments, columns));
         }
     }
@@ -88,7 +89,7 @@ impl Comments {
 
 impl Columns {
     /// Sorts the names of the header line.
-    fn parse(line: Line<'_>, dimension: Dimension) -> Result<Self, MeasurementError> {
+    fn parse(line: Line<'_>, dimension: Dimension, needs: Needs) -> Result<Self, MeasurementError> {
         let names = split(line)?;
         refuse_doubles(line, &names)?;
         refuse_raw_readings(line, &names)?;
@@ -104,7 +105,7 @@ impl Columns {
             return Err(line.invalid("header", expected, quoted(extra)));
         }
         let channels: Vec<usize> = (0..names.len()).filter(|&i| !is_reserved(&names[i])).collect();
-        if channels.is_empty() {
+        if channels.is_empty() && needs == Needs::Values {
             let expected = "a column of values besides the angles, under the channel's name";
             return Err(line.invalid("header", expected, quoted(line.text)));
         }

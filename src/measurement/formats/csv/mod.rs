@@ -16,10 +16,19 @@ mod header;
 mod read;
 mod write;
 
-pub(super) use read::read;
+pub(super) use read::{read, read_directions};
 pub(super) use write::write;
 
 use crate::measurement::MerlAngles;
+
+/// What a file must hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Needs {
+    /// Directions; values may be missing.
+    Directions,
+    /// Directions and at least one channel of values.
+    Values,
+}
 
 /// Names of the angle columns, in the order written.
 const ANGLES: [&str; 4] = ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"];

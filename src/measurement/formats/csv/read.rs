@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::Needs;
 use super::header::{self, Columns, Comments};
 use crate::geometry::angles::direction_deg;
 use crate::measurement::formats::limits::{AZIMUTH_DEG, FLAT_POLAR_DEG, Limit, POLAR_DEG};
@@ -19,8 +20,20 @@ pub(in crate::measurement::formats) fn read(
     source: &Source,
     options: &ReadOptions,
 ) -> Result<Measurement, MeasurementError> {
+    read_table(source, options, Needs::Values)
+}
+
+/// Reads the directions and weights of a CSV file that need not hold values: without any the table has no channel.
+pub(in crate::measurement::formats) fn read_directions(
+    source: &Source,
+    options: &ReadOptions,
+) -> Result<Measurement, MeasurementError> {
+    read_table(source, options, Needs::Directions)
+}
+
+fn read_table(source: &Source, options: &ReadOptions, needs: Needs) -> Result<Measurement, MeasurementError> {
     let mut lines = Lines::new(source)?;
-    let (comments, columns) = header::read(&mut lines)?;
+    let (comments, columns) = header::read(&mut lines, needs)?;
     let mut table = Table::new(&comments, &columns, options.quantity.unwrap_or(comments.quantity));
     let mut cells = Vec::new();
     while let Some(line) = lines.next_filled()? {
@@ -29,7 +42,7 @@ pub(in crate::measurement::formats) fn read(
         table.row(line, &cells)?;
     }
     let expected = comments.grid.map_or(1, |_| MerlGrid::LEN);
-    if table.rows.len() < expected {
+    if table.read < expected {
         let rows = if expected == 1 { "a row of data".into() } else { format!("{expected} rows of the MERL grid") };
         return Err(lines.ends_too_early(rows));
     }
@@ -51,6 +64,8 @@ struct Table<'a> {
     columns: &'a Columns,
     quantity: Quantity,
     rows: Rows,
+    /// Rows read so far.
+    read: usize,
     sigma: Vec<Vec<f64>>,
     common: Vec<Vec<Vec<f64>>>,
     weight: Vec<f64>,
@@ -64,6 +79,7 @@ impl<'a> Table<'a> {
             columns,
             quantity,
             rows: Rows::of_world(comments.dimension, channels, quantity),
+            read: 0,
             sigma: vec![Vec::new(); columns.sigma.len()],
             common: vec![vec![Vec::new(); channels]; columns.common.len()],
             weight: Vec::new(),
@@ -89,6 +105,7 @@ impl<'a> Table<'a> {
         if let Some(column) = columns.weight {
             self.weight.push(not_negative(line, &columns.label(column), cell(column))?);
         }
+        self.read += 1;
         Ok(())
     }
 
@@ -120,7 +137,7 @@ impl<'a> Table<'a> {
     }
 
     fn check_grid(&self, line: Line<'_>, grid: MerlGrid, wi: DVec3, wo: DVec3) -> Result<(), MeasurementError> {
-        let index = self.rows.len();
+        let index = self.read;
         if index >= MerlGrid::LEN {
             let expected = format!("no more than the {} rows of the MERL grid", MerlGrid::LEN);
             return Err(line.invalid("", expected, "another row"));
