@@ -60,7 +60,9 @@ fn every_format_gives_the_same_reflectance() {
         ("view-light-dphi-intervals.alta", "ALTA text", 100, 100, 1e-13),
         ("plane-symmetrical.zemax.bsdf", "Zemax BSDF text", 741, 634, 1e-6),
         ("grid.fred.txt", "FRED BSDF text", 311, 311, 1e-9),
+        ("grid-pole-for-every-azimuth.fred.txt", "FRED BSDF text", 347, 347, 1e-9),
         ("in-plane.fred.txt", "FRED BSDF text", 34, 34, 1e-9),
+        ("in-plane-two-azimuths.fred.txt", "FRED BSDF text", 36, 36, 1e-9),
     ] {
         let table = fixture(name);
         assert_eq!((table.origin.as_str(), table.len()), (format, entries), "{name}");
@@ -117,9 +119,19 @@ fn the_flat_world_is_read_as_one() {
     for i in 0..table.len() {
         let (wi, wo) = table.directions.pair(i);
         let want = 0.1 + 0.3 * norm * mirror(wi).dot(wo).max(0.0).powi(20);
-        let value = table.value(0, i).expect("valid");
-        assert!(wi.y.abs() + wo.y.abs() < 1e-300 && (value / want - 1.0).abs() < 1e-13, "{value} for {want}");
+        assert!(wi.y.abs() + wo.y.abs() < 1e-300);
+        // θo = −90° is on the horizon.
+        let Some(value) = table.value(0, i) else {
+            assert!(wo.z == 0.0, "entry {i}");
+            continue;
+        };
+        assert!(wo.z > 0.0 && (value / want - 1.0).abs() < 1e-13, "{value} for {want}");
     }
+    assert_eq!(table.masked.marked, 3);
+    assert_eq!(table.notes, ["masked as at the horizon: 3 of the values, the first at line 3, column r"]);
+    let both = b"# dimension: 2\ntheta_i_deg,theta_o_deg,r\n90,0,0.1\n0,90,0.1\n-90,0,0.1\n0,-90,0.1\n0,89.9,0.1\n";
+    let table = read_bytes(both.to_vec(), MerlAngles::Center);
+    assert_eq!((0..5).map(|i| table.value(0, i)).collect::<Vec<_>>(), [None, None, None, None, Some(0.1)]);
 }
 
 #[test]
@@ -129,6 +141,18 @@ fn quantity_and_format_can_be_overridden() {
     let table = formats::read(&path, &as_brdf).expect("valid");
     let (wi, wo) = table.directions.pair(7);
     assert!((table.value(0, 7).expect("valid") / (brdf(wi, wo) * wo.z) - 1.0).abs() < 1e-13);
+    let (merl, _) = written(&merl_table(MerlAngles::Center), Format::Merl);
+    for (quantity, refused) in [(Quantity::Brdf, false), (Quantity::BrdfCos, true)] {
+        let options = ReadOptions { quantity: Some(quantity), ..ReadOptions::default() };
+        match formats::read_bytes(Path::new("t.binary"), merl.clone(), &options) {
+            Err(error @ MeasurementError::Unsupported { .. }) if refused => {
+                assert!(
+                    error.to_string().contains("holds the BRDF by definition; read it without --quantity brdf_cos")
+                );
+            }
+            other => assert!(other.is_ok() && !refused, "{quantity:?}"),
+        }
+    }
     let as_fred = ReadOptions { format: Some(Format::Fred), ..ReadOptions::default() };
     let error = formats::read(&path, &as_fred).expect_err("not FRED").to_string();
     assert!(error.contains("expected type bsdf_data"), "{error}");
@@ -147,7 +171,11 @@ fn grids_bring_their_solid_angles() {
     let up_to_85 = integral(85f64.to_radians(), &|_| true);
     // The weights carry the incidence's own cell too: ∫ sinθ dθ from 15° to 45°.
     let incidence = 15f64.to_radians().cos() - 45f64.to_radians().cos();
-    for (name, truth) in [("plane-symmetrical.zemax.bsdf", about_mirror), ("grid.fred.txt", up_to_85)] {
+    for (name, truth) in [
+        ("plane-symmetrical.zemax.bsdf", about_mirror),
+        ("grid.fred.txt", up_to_85),
+        ("grid-pole-for-every-azimuth.fred.txt", up_to_85),
+    ] {
         let table = fixture(name);
         assert!(matches!(table.weights, Weights::SolidAngle(_)), "{name}");
         let mine = (0..table.len()).filter(|&i| (table.directions.pair(i).0 - wi).length() < 1e-12);
@@ -156,7 +184,112 @@ fn grids_bring_their_solid_angles() {
         println!("{name}: {sum} for {truth}");
         assert!((sum / truth - 1.0).abs() < 0.03, "{name}: {sum} for {truth}");
     }
-    assert!(matches!(fixture("in-plane.fred.txt").weights, Weights::Uniform));
+    for name in ["in-plane.fred.txt", "in-plane-two-azimuths.fred.txt"] {
+        assert!(matches!(fixture(name).weights, Weights::Uniform), "{name}");
+    }
+}
+
+/// A FRED file of one block at 10° whose rows are these (θ, φ).
+fn fred_block(rows: impl IntoIterator<Item = (u32, u32)>) -> Measurement {
+    let rows: Vec<String> = rows.into_iter().map(|(theta, phi)| format!("{theta} {phi} 0.1\n")).collect();
+    let text = format!("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n{}", rows.concat());
+    read_bytes(text.into_bytes(), MerlAngles::Center)
+}
+
+#[test]
+fn rows_of_one_node_share_its_solid_angle() {
+    // The pole at every azimuth against the pole once: with all rows there, and with one missing.
+    for (pole, missing) in [(true, false), (true, true), (false, false), (false, true)] {
+        let ring = |theta| [0, 60, 120, 180].map(move |phi| (theta, phi));
+        let rows = (0..=80).step_by(10).flat_map(ring).filter(|row| pole || row.0 > 0 || row.1 == 0);
+        let table = fred_block(rows.filter(|row| !(missing && *row == (40, 60))));
+        let sum = |keep: &dyn Fn(f64) -> bool| -> f64 {
+            (0..table.len()).filter(|&i| keep(table.directions.pair(i).1.z)).map(|i| table.weights.get(i)).sum()
+        };
+        assert!(matches!(table.weights, Weights::SolidAngle(_)));
+        let cap = 2.0 * PI * (1.0 - 5f64.to_radians().cos());
+        assert!((sum(&|z| z > 0.999) / cap - 1.0).abs() < 1e-12, "pole {pole}, missing {missing}");
+        if !missing {
+            assert!((sum(&|_| true) / (2.0 * PI * (1.0 - 85f64.to_radians().cos())) - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn azimuths_with_a_wide_gap_are_no_grid() {
+    for (azimuths, grid) in [
+        (vec![0, 180], false),
+        (vec![0, 180, 360], false),
+        (vec![0, 120, 240], false),
+        (vec![60, 90, 120], false),
+        (vec![0, 90], false),
+        (vec![45, 135], false),
+        (vec![0, 90, 180], true),
+        (vec![0, 90, 180, 270], true),
+    ] {
+        let table = fred_block((10..=80).step_by(10).flat_map(|t| azimuths.iter().map(move |&p| (t, p))));
+        assert_eq!(matches!(table.weights, Weights::SolidAngle(_)), grid, "{azimuths:?}");
+    }
+}
+
+/// Writes `content` to a file and reads its directions.
+fn directions_of(content: &[u8]) -> Result<(Directions, Weights, Dimension), MeasurementError> {
+    let file = tempfile::NamedTempFile::new().expect("file");
+    std::fs::write(file.path(), content).expect("written");
+    formats::read_directions(file.path(), &ReadOptions::default())
+}
+
+#[test]
+fn a_list_of_directions_needs_no_values() {
+    let angles = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg";
+    let (directions, weights, dimension) =
+        directions_of(format!("{angles}\n30,0,60,180\n0,0,100,0\n").as_bytes()).expect("directions");
+    assert_eq!((directions.len(), weights, dimension), (2, Weights::Uniform, Dimension::Space));
+    assert_eq!(directions.pair(0), (direction_deg(30.0, 0.0), direction_deg(60.0, 180.0)));
+    assert!(directions.pair(1).1.z < 0.0); // kept
+    let (_, weights, _) = directions_of(format!("weight,{angles}\n2,30,0,60,180\n").as_bytes()).expect("weighted");
+    assert_eq!(weights, Weights::Column(vec![2.0]));
+    let flat = b"# dimension: 2\ntheta_i_deg,theta_o_deg\n-30,40\n10,-90\n";
+    let (directions, _, dimension) = directions_of(flat).expect("flat");
+    assert_eq!((directions.len(), dimension), (2, Dimension::Flat));
+    // A measurement serves as well.
+    for name in ["every-column-in-any-order.csv", "grid.fred.txt", "in-plane-flat-world.csv"] {
+        let table = fixture(name);
+        let (directions, weights, dimension) =
+            formats::read_directions(&fixture_path(name), &ReadOptions::default()).expect("a measurement");
+        assert_eq!((directions, weights, dimension), (table.directions, table.weights, table.dimension), "{name}");
+    }
+    // What is broken is refused as in a measurement.
+    for (content, fact) in [
+        (format!("{angles}\n"), "expected a row of data"),
+        (format!("{angles}\n0,0,1000,0\n"), "line 2, column theta_o_deg"),
+        (format!("{angles},sigma_r\n0,0,10,0,0.1\n"), "the name of a channel"),
+        ("theta_i_deg,theta_o_deg\n0,10\n".to_string(), "`# dimension: 2`"),
+    ] {
+        let error = directions_of(content.as_bytes()).expect_err("refused").to_string();
+        assert!(error.contains(fact), "{error}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_read_once_and_whole() {
+    let folder = tempfile::tempdir().expect("folder");
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo");
+    assert!(made.success());
+    let content = std::fs::read(fixture_path("masked-values.csv")).expect("bytes");
+    let writer = std::thread::spawn({
+        let (pipe, content) = (pipe.clone(), content.clone());
+        move || std::fs::write(pipe, content)
+    });
+    let bytes = formats::read_stream(&pipe).expect("readable");
+    writer.join().expect("thread").expect("written");
+    assert_eq!(bytes.as_deref(), Some(content.as_slice()));
+    let table = formats::read_bytes(&pipe, content, &ReadOptions::default()).expect("a measurement");
+    assert_eq!(table.directions, fixture("masked-values.csv").directions);
+    assert_eq!(formats::read_stream(&fixture_path("masked-values.csv")).expect("regular"), None);
+    assert!(formats::read_stream(folder.path()).is_err());
 }
 
 /// A table on the MERL grid of many-digit values, some of them masked.
@@ -247,6 +380,7 @@ fn csv_keeps_everything_of_every_fixture() {
         "half-angle-cosine-rgb.alta",
         "plane-symmetrical.zemax.bsdf",
         "grid.fred.txt",
+        "grid-pole-for-every-azimuth.fred.txt",
     ] {
         let table = fixture(name);
         let back = read_bytes(written(&table, Format::Csv).0, MerlAngles::Center);
@@ -430,7 +564,7 @@ fn crlf_and_byte_order_mark_change_nothing() {
         assert_eq!((unix.channels, unix.masked, unix.notes), (windows.channels, windows.masked, windows.notes));
         files += 1;
     }
-    assert_eq!(files, 10);
+    assert_eq!(files, 12);
 }
 
 #[test]

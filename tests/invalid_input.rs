@@ -12,7 +12,7 @@ use goniofit::numeric::random::{Purpose, RngExt, stream};
 /// A file of `data-fixtures/invalid`, and what its error must say of place, expected and found.
 type Broken = (&'static str, [&'static str; 3]);
 
-const CSV: [Broken; 29] = [
+const CSV: [Broken; 34] = [
     ("csv-text-for-number.csv", ["line 3, column r", "expected a number", "found \"bright\""]),
     ("csv-text-for-angle.csv", ["line 2, column theta_o_deg", "expected a number", "found \"ten\""]),
     ("csv-extra-column.csv", ["line 3", "expected 5 cells", "found 6"]),
@@ -26,6 +26,11 @@ const CSV: [Broken; 29] = [
     ("csv-sigma-missing-for-valid-value.csv", ["line 3, column sigma_r", "expected a number", "found \"\""]),
     ("csv-sigma-for-one-channel-of-two.csv", ["line 1, header", "every channel (r, g) or for none", "sigma_r\""]),
     ("csv-common-without-number.csv", ["line 1, header", "expected common_<number>_<channel>", "found \"common_r\""]),
+    ("csv-common-leading-zero.csv", ["line 1, header", "in plain digits (1, not 01 or +1)", "found \"common_01_r\""]),
+    ("csv-common-plus-sign.csv", ["line 1, header", "in plain digits (1, not 01 or +1)", "found \"common_+1_r\""]),
+    ("csv-common-for-one-channel-of-two.csv", ["line 1, header", "every channel (r, g) or for none", "common_2_g\""]),
+    ("csv-theta-out-of-range.csv", ["line 3, column theta_o_deg", "from −180 to 180 degrees", "found 1000"]),
+    ("csv-phi-out-of-range.csv", ["line 2, column phi_i_deg", "from −360 to 360 degrees", "found -400"]),
     ("csv-common-not-finite.csv", ["line 2, column common_1_r", "expected a finite number", "found \"inf\""]),
     ("csv-duplicate-column.csv", ["line 1, header", "expected each column once", "found \"r\" twice"]),
     ("csv-unnamed-column.csv", ["line 1, header", "expected a name for every column", "phi_o_deg,r,\""]),
@@ -44,7 +49,7 @@ const CSV: [Broken; 29] = [
     ("csv-not-utf8.csv", ["line 3", "expected text in UTF-8", "found other bytes"]),
 ];
 
-const ALTA: [Broken; 14] = [
+const ALTA: [Broken; 17] = [
     ("alta-no-dim.alta", ["line 2", "expected #DIM", "found a row"]),
     ("alta-no-parameterisation.alta", ["line 2", "expected #PARAM_IN", "found a row"]),
     ("alta-dim-contradicts-parameterisation.alta", ["#DIM", "expected 1 coordinates for COS_TH", "found 2 1"]),
@@ -56,6 +61,9 @@ const ALTA: [Broken; 14] = [
     ("alta-short-row.alta", ["line 5", "expected 4 numbers", "found 3"]),
     ("alta-text-for-number.alta", ["line 5, column 3", "expected a number", "found \"zero\""]),
     ("alta-direction-not-finite.alta", ["line 4, column 2", "expected a finite coordinate", "not finite"]),
+    ("alta-in-degrees.alta", ["line 5, column 2", "expected an angle from −π to π radians", "found 15"]),
+    ("alta-azimuth-out-of-range.alta", ["line 4, column 3", "an azimuth from −2π to 2π radians", "found 6.4"]),
+    ("alta-projected-angle-out-of-range.alta", ["line 4, columns 2 and 3", "from −π to π radians", "found 3.535"]),
     ("alta-cosine-above-one.alta", ["line 3", "expected coordinates of a direction", "found [1.5]"]),
     ("alta-no-rows.alta", ["after line 3", "expected a row of data", "found the end of the file"]),
     ("alta-binary.alta", ["line 3", "only its text", "binary form is not read"]),
@@ -79,11 +87,14 @@ const ZEMAX: [Broken; 15] = [
     ("zemax-count-not-a-number.bsdf", ["line 11, ScatterRadial", "expected how many angles", "found \"many\""]),
 ];
 
-const OTHERS: [Broken; 14] = [
+const OTHERS: [Broken; 17] = [
     ("fred-row-before-block.txt", ["line 3", "expected a block's two angles first", "found \"5 0 0.1\""]),
     ("fred-four-numbers.txt", ["line 5", "expected 2 numbers", "found 4"]),
     ("fred-text-for-number.txt", ["line 4, column 3", "expected a number", "found \"low\""]),
     ("fred-angle-not-finite.txt", ["line 4", "expected finite angles", "found \"inf 0 0.1\""]),
+    ("fred-block-angle-out-of-range.txt", ["line 3, column 1", "from −180 to 180 degrees", "found -190"]),
+    ("fred-theta-out-of-range.txt", ["line 5, column 1", "from −180 to 180 degrees", "found 185"]),
+    ("fred-phi-out-of-range.txt", ["line 4, column 2", "from −360 to 360 degrees", "found 365"]),
     ("fred-no-rows.txt", ["after line 3", "expected a row of data", "found the end of the file"]),
     ("fred-direction-cosines.txt", ["line 2", "expected angles=deg", "found angles=sin"]),
     ("fred-logarithms.txt", ["line 2", "expected bsdf=value", "found bsdf=log"]),
@@ -253,7 +264,7 @@ fn text_fixtures() -> Vec<(String, Vec<u8>)> {
         |p: PathBuf| (p.file_name().expect("name").to_string_lossy().into_owned(), std::fs::read(&p).expect("bytes"));
     let mut all: Vec<_> = paths.map(read).collect();
     all.sort();
-    assert_eq!(all.len(), 10);
+    assert_eq!(all.len(), 12);
     all
 }
 
@@ -326,6 +337,25 @@ fn damaged_bytes_never_panic() {
     }
     println!("{refused} refused, {read} read");
     assert!(refused > 100 && read > 100);
+}
+
+#[test]
+fn a_header_of_60_000_columns_takes_no_longer_than_its_length_calls_for() {
+    let header = |last: &str| {
+        let names = (0..30_000).flat_map(|i| [format!("c{i}"), format!("sigma_c{i}")]);
+        let names: Vec<String> = names.chain([last.to_string()]).collect();
+        format!("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,{}\n", names.join(","))
+    };
+    let error_of = |text: String| {
+        let start = std::time::Instant::now();
+        let read = formats::read_bytes(Path::new("wide.csv"), text.into_bytes(), &ReadOptions::default());
+        // Milliseconds, with room for a busy machine; comparing every name with every other took seconds.
+        assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
+        read.expect_err("refused").to_string()
+    };
+    assert!(error_of(header("weight")).contains("expected a row of data"));
+    assert!(error_of(header("c17")).contains("expected each column once, found \"c17\" twice"));
+    assert!(error_of(header("common_1_c5")).contains("c8, c9, …) or for none"));
 }
 
 #[test]

@@ -138,6 +138,21 @@ def fred():
                     continue  # the source is in the detector's way
                 out.append(f"{to}\t{po}\t{2 * brdf(wi, direction(to, po)):.9e}")
     write("grid.fred.txt", "\n".join(out) + "\n")
+    # The pole once for every azimuth; the block at 30 degrees is complete.
+    out = ["type bsdf_data", "format angles=deg bsdf=value scale=1"]
+    for ti in (0, 30, 60):
+        out.append(f"{ti}\t0")
+        for to in range(0, 81, 10):
+            for po in range(0, 181, 15):
+                if to == ti and po > 150 and ti != 30:
+                    continue
+                out.append(f"{to}\t{po}\t{brdf(direction(ti, 180), direction(to, po)):.9e}")
+    write("grid-pole-for-every-azimuth.fred.txt", "\n".join(out) + "\n")
+    out = ["type bsdf_data", "format angles=deg bsdf=value scale=1"]
+    for ti in (15, 45):
+        out.append(f"{ti}\t0")
+        out += [f"{to}\t{po}\t{brdf(direction(ti, 180), direction(to, po)):.9e}" for po in (0, 180) for to in range(0, 81, 10)]
+    write("in-plane-two-azimuths.fred.txt", "\n".join(out) + "\n")
     out = ["type bsdf_data", "format angles=deg bsdf=value scale=1"]
     for ti in (15, 45):
         out.append(f"{ti}\t0")

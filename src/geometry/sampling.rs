@@ -1,10 +1,10 @@
-//! Maps from the unit square to directions, with their densities (per sr) and inverses.
+//! Maps from the unit square to directions, with their densities (per sr) where the caller needs them.
 
-use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{angles::cap_solid_angle, frame::Frame};
+use super::frame::Frame;
 use crate::numeric::float::sqrt_nonneg;
 
 /// Unit square to unit disc, area-preserving and continuous (Shirley & Chiu 1997).
@@ -22,24 +22,6 @@ pub fn square_to_disc(u: DVec2) -> DVec2 {
     r * DVec2::new(phi.cos(), phi.sin())
 }
 
-/// Unit disc back to the unit square, the inverse of [`square_to_disc`].
-#[must_use]
-pub fn disc_to_square(d: DVec2) -> DVec2 {
-    let r = d.length();
-    let phi = d.y.atan2(d.x);
-    let folded = if phi < -FRAC_PI_4 { phi + TAU } else { phi };
-    let (a, b) = if folded < FRAC_PI_4 {
-        (r, folded * r / FRAC_PI_4)
-    } else if folded < 3.0 * FRAC_PI_4 {
-        (-(folded - 2.0 * FRAC_PI_4) * r / FRAC_PI_4, r)
-    } else if folded < 5.0 * FRAC_PI_4 {
-        (-r, (folded - PI) * -r / FRAC_PI_4)
-    } else {
-        ((folded - 6.0 * FRAC_PI_4) * r / FRAC_PI_4, -r)
-    };
-    0.5 * (DVec2::new(a, b) + DVec2::ONE)
-}
-
 /// A direction of the upper hemisphere with density cosθ/π (Malley's method).
 #[must_use]
 pub fn cosine_hemisphere(u: DVec2) -> DVec3 {
@@ -53,12 +35,6 @@ pub fn cosine_hemisphere_pdf(w: DVec3) -> f64 {
     FRAC_1_PI * w.z.clamp(0.0, f64::INFINITY)
 }
 
-/// The point of the unit square that [`cosine_hemisphere`] maps to `w`.
-#[must_use]
-pub fn cosine_hemisphere_inverse(w: DVec3) -> DVec2 {
-    disc_to_square(w.truncate())
-}
-
 /// A direction uniform over the sphere.
 #[must_use]
 pub fn uniform_sphere(u: DVec2) -> DVec3 {
@@ -67,9 +43,6 @@ pub fn uniform_sphere(u: DVec2) -> DVec3 {
     let (s, c) = (TAU * u.y).sin_cos();
     DVec3::new(r * c, r * s, z)
 }
-
-/// Density of [`uniform_sphere`], per sr.
-pub const UNIFORM_SPHERE_PDF: f64 = 0.25 * FRAC_1_PI;
 
 /// A direction about the unit vector `axis` with density (n + 1)/2π · cosⁿα, α the angle from the axis, n = `exponent` ≥ 0.
 ///
@@ -83,45 +56,12 @@ pub fn cosine_power(axis: DVec3, exponent: f64, u: DVec2) -> DVec3 {
     Frame::from_normal(axis).to_world(DVec3::new(sin_a * c, sin_a * s, cos_a))
 }
 
-/// A direction uniform in the cone of half-angle `theta_max` (rad) about the unit vector `axis`.
-#[must_use]
-pub fn uniform_cone(axis: DVec3, theta_max: f64, u: DVec2) -> DVec3 {
-    let one_minus_cos = 2.0 * u.x * (0.5 * theta_max).sin().powi(2);
-    let sin_t = sqrt_nonneg(one_minus_cos * (2.0 - one_minus_cos));
-    let (s, c) = (TAU * u.y).sin_cos();
-    Frame::from_normal(axis).to_world(DVec3::new(sin_t * c, sin_t * s, 1.0 - one_minus_cos))
-}
-
-/// Density of [`uniform_cone`] inside the cone, per sr.
-#[must_use]
-pub fn uniform_cone_pdf(theta_max: f64) -> f64 {
-    1.0 / cap_solid_angle(theta_max)
-}
-
-/// Barycentric coordinates (b1, b2) of a point uniform over a triangle p0 + b1 (p1 − p0) + b2 (p2 − p0).
-#[must_use]
-pub fn uniform_triangle(u: DVec2) -> DVec2 {
-    let root = sqrt_nonneg(u.x);
-    DVec2::new(root * (1.0 - u.y), root * u.y)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::angles::angle_between;
     use crate::numeric::random::{Purpose, RngExt, stream};
     use crate::numeric::stats::chi_square_test;
-
-    #[test]
-    fn disc_and_square_invert_each_other() {
-        for i in 0..40 {
-            for j in 0..40 {
-                let u = DVec2::new((f64::from(i) + 0.5) / 40.0, (f64::from(j) + 0.5) / 40.0);
-                let back = disc_to_square(square_to_disc(u));
-                assert!((back - u).length() < 1e-14, "{u} → {back}");
-            }
-        }
-    }
 
     /// χ² of samples against the density, binned by the angle from the axis (16 bins of equal probability).
     fn check(name: &str, draw: impl Fn(DVec2) -> f64) {
@@ -138,6 +78,10 @@ mod tests {
     #[test]
     fn samples_follow_their_densities() {
         check("cosine", |u| 1.0 - cosine_hemisphere(u).z.powi(2));
+        check("disc, azimuth", |u| {
+            let d = square_to_disc(u);
+            0.5 + d.y.atan2(d.x) / TAU
+        });
         check("sphere", |u| 0.5 * (1.0 - uniform_sphere(u).z));
         let axis = DVec3::new(0.6, 0.0, 0.8);
         for n in [0.0, 1.0, 50.0, 1e6] {
@@ -145,9 +89,6 @@ mod tests {
                 let half = 0.5 * angle_between(axis, cosine_power(axis, n, u));
                 -f64::exp_m1((n + 1.0) * f64::ln_1p(-2.0 * half.sin().powi(2)))
             });
-        }
-        for t in [1e-4, 0.5, 2.0] {
-            check("cone", |u| cap_solid_angle(angle_between(axis, uniform_cone(axis, t, u))) / cap_solid_angle(t));
         }
     }
 }

@@ -166,13 +166,21 @@ fn channel(table: &Measurement, c: usize) -> ChannelSummary {
     }
 }
 
+/// The middle value; the mean of the two in the middle of an even number.
 fn median(mut values: Vec<f64>) -> Option<f64> {
+    let odd = values.len() % 2 == 1;
     let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    if values.is_empty() {
+        return None;
+    }
+    let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let lower = if odd { None } else { below.iter().copied().max_by(f64::total_cmp) };
+    Some(lower.map_or(upper, |lower| 0.5 * (lower + upper)))
 }
 
-/// Compares every value with that of the swapped pair (same angles to 10⁻³°, azimuths folded). The MERL grid has no swapped
-/// pairs of its own: its coordinates are reciprocal by construction.
+/// Compares every value with that of the swapped pair (same angles to 10⁻³°, azimuths folded), as it should be for an isotropic
+/// material: `None` where the values depend on the azimuth of incidence. The MERL grid has no swapped pairs of its own: its
+/// coordinates are reciprocal by construction.
 fn reciprocity(table: &Measurement) -> Option<Reciprocity> {
     let Directions::List { wi, wo } = &table.directions else { return None };
     let key = |a: glam::DVec3, b: glam::DVec3| {
@@ -184,7 +192,11 @@ fn reciprocity(table: &Measurement) -> Option<Reciprocity> {
     };
     let mut seen = BTreeMap::new();
     for i in 0..table.len() {
-        seen.entry(key(wi[i], wo[i])).or_insert(i);
+        let first = *seen.entry(key(wi[i], wo[i])).or_insert(i);
+        let swapped = !turned(wi[first], wo[i]) && !turned(wo[first], wi[i]);
+        if turned(wi[first], wi[i]) && !swapped && !same_values(table, first, i) {
+            return None;
+        }
     }
     let mut differences = Vec::new();
     for (&(ta, tb, turn), &i) in seen.range(..) {
@@ -198,6 +210,19 @@ fn reciprocity(table: &Measurement) -> Option<Reciprocity> {
     }
     let pairs = differences.len();
     Some(Reciprocity { pairs, median_relative_difference: median(differences)? })
+}
+
+/// Whether two directions differ by more than 10⁻³°.
+fn turned(a: glam::DVec3, b: glam::DVec3) -> bool {
+    (a - b).length() > 1e-3f64.to_radians()
+}
+
+/// Whether two entries agree to 10⁻⁹ of the value in every channel that both hold.
+fn same_values(table: &Measurement, i: usize, j: usize) -> bool {
+    (0..table.channels.len()).all(|c| match (table.value(c, i), table.value(c, j)) {
+        (Some(a), Some(b)) => (a - b).abs() <= 1e-9 * a.abs().max(b.abs()),
+        _ => true,
+    })
 }
 
 #[cfg(test)]
@@ -222,5 +247,34 @@ mod tests {
         assert_eq!(r.pairs, 1);
         assert!((r.median_relative_difference - 0.1 / 1.05).abs() < 1e-12);
         assert_eq!((s.channels[0].min, s.channels[0].max), (Some(1.0), Some(1.1)));
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_lies_between_the_middle_two() {
+        assert_eq!(median(vec![]), None);
+        assert_eq!(median(vec![3.0]), Some(3.0));
+        assert_eq!(median(vec![9.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 8.0, 2.0]), Some(3.0));
+    }
+
+    /// A table of pairs (θi, φi, θo, φo) in degrees.
+    fn listed(angles: &[[f64; 4]], values: Vec<f64>) -> Measurement {
+        let wi = angles.iter().map(|a| direction_deg(a[0], a[1])).collect();
+        let wo = angles.iter().map(|a| direction_deg(a[2], a[3])).collect();
+        Measurement::new("t", Directions::List { wi, wo }, vec!["v".into()], values)
+    }
+
+    #[test]
+    fn azimuths_of_incidence_are_not_compared_with_each_other_where_they_matter() {
+        // (30°, 60°) in the plane of incidence and its swap, then the first turned by 90°.
+        let angles = [[30.0, 0.0, 60.0, 180.0], [60.0, 0.0, 30.0, 180.0], [30.0, 90.0, 60.0, 270.0]];
+        let of = |turned: f64| listed(&angles, vec![1.0, 1.0, turned]).summary().reciprocity;
+        assert!(of(2.0).is_none() && of(1.0 + 1e-8).is_none());
+        assert_eq!(of(1.0).expect("isotropic").pairs, 1);
+        // The same azimuth again, and a swap at one polar angle, may differ by noise.
+        let mut noisy = angles.to_vec();
+        noisy[2] = angles[0];
+        noisy.extend([[40.0, 0.0, 40.0, 90.0], [40.0, 90.0, 40.0, 0.0]]);
+        assert_eq!(listed(&noisy, vec![1.0, 1.1, 1.2, 2.0, 2.1]).summary().reciprocity.expect("pairs").pairs, 1);
     }
 }

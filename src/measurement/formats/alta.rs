@@ -11,6 +11,7 @@
 
 use glam::DVec3;
 
+use super::limits::{AZIMUTH_RAD, Limit, POLAR_RAD};
 use super::rows::Rows;
 use super::source::Source;
 use super::text::{Line, Lines, quoted};
@@ -45,6 +46,16 @@ impl ParamIn {
         (Self::Spherical, "SPHERICAL_TL_PL_TV_PV", 4),
         (Self::Cartesian, "CARTESIAN", 6),
     ];
+
+    /// Ranges of the coordinates that are angles, which come first in every row.
+    fn limits(self) -> &'static [Limit] {
+        match self {
+            Self::TlTvProjDphi => &[POLAR_RAD, POLAR_RAD, POLAR_RAD],
+            Self::TvTlDphi | Self::ThTdPd => &[POLAR_RAD, POLAR_RAD, AZIMUTH_RAD],
+            Self::Spherical => &[POLAR_RAD, AZIMUTH_RAD, POLAR_RAD, AZIMUTH_RAD],
+            Self::CosTh | Self::Cartesian => &[],
+        }
+    }
 
     /// (wi, wo) at coordinates `x`; `None` where there is no such direction.
     fn pair(self, x: &[f64]) -> Option<(DVec3, DVec3)> {
@@ -230,6 +241,12 @@ impl Body {
         let (x, rest) = numbers.split_at(self.nx);
         if let Some(i) = x.iter().position(|c| !c.is_finite()) {
             return Err(line.invalid(&format!("column {}", i + 1), "a finite coordinate", "one that is not finite"));
+        }
+        for (i, (&angle, limit)) in x.iter().zip(self.param.limits()).enumerate() {
+            limit.check(line, || format!("column {}", i + 1), angle)?;
+        }
+        if let (ParamIn::TlTvProjDphi, &[_, x, y]) = (self.param, x) {
+            POLAR_RAD.check(line, || "columns 2 and 3, θo".into(), x.hypot(y))?;
         }
         let Some((wi, wo)) = self.param.pair(x) else {
             return Err(line.invalid("", "coordinates of a direction", format!("{x:?}")));

@@ -14,13 +14,22 @@
 //! source is in the detector's way at the retro side) lie at φ = 180°.
 //!
 //! Rows that form a grid in (θ, φ), missing nodes allowed, get its solid angles; azimuths within [0°, 180°] stand for both halves.
+//! A node that is listed several times (the pole once for every azimuth, say) shares its solid angle among its rows. Azimuths that
+//! leave a gap of more than 90° (the two of a scan in the plane of incidence) are no grid over the hemisphere.
 
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use super::limits::{AZIMUTH_DEG, POLAR_DEG};
 use super::rows::{Divisor, Rows};
 use super::source::Source;
 use super::text::{Lines, quoted};
 use super::{ReadOptions, cells};
 use crate::geometry::angles::direction_deg;
 use crate::measurement::{Measurement, MeasurementError, Weights};
+
+/// Widest gap between azimuths of a grid over the hemisphere; 180° is that of a scan in the plane of incidence.
+const LARGEST_GAP_DEG: f64 = 90.0;
 
 /// A block of rows that share the light's direction.
 struct Block {
@@ -40,6 +49,10 @@ pub(super) fn read(source: &Source, options: &ReadOptions) -> Result<Measurement
         let numbers = line.numbers()?;
         if numbers.iter().take(2).any(|angle| !angle.is_finite()) {
             return Err(line.invalid("", "finite angles", quoted(line.text)));
+        }
+        if let &[theta_deg, phi_deg, ..] = numbers.as_slice() {
+            POLAR_DEG.check(line, || "column 1".into(), theta_deg)?;
+            AZIMUTH_DEG.check(line, || "column 2".into(), phi_deg)?;
         }
         match (numbers.as_slice(), blocks.last_mut()) {
             (&[theta_deg, phi_deg], _) => blocks.push(Block { theta_deg, phi_deg, scatter: Vec::new() }),
@@ -66,7 +79,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions) -> Result<Measurement
 impl Block {
     /// Adds a row's directions.
     fn row(&mut self, rows: &mut Rows, theta: f64, phi: f64) -> Divisor {
-        self.scatter.push((theta, phi));
+        self.scatter.push((theta + 0.0, phi + 0.0)); // −0 is 0
         rows.directions(direction_deg(self.theta_deg, self.phi_deg + 180.0), direction_deg(theta, phi))
     }
 }
@@ -118,26 +131,43 @@ fn weights(blocks: &[Block]) -> Option<Vec<f64>> {
     Some(all)
 }
 
-/// Solid angle of each row of a block that is a grid of at least two θ and two φ, at least three quarters of its nodes listed.
+/// Solid angle of each row of a block that is a grid of at least two θ, and of three φ or more all round, at least three quarters of its nodes
+/// listed.
 fn block_cells(block: &Block) -> Option<Vec<f64>> {
     let thetas = unique(block.scatter.iter().map(|row| row.0));
     let phis = unique(block.scatter.iter().filter(|row| row.0 != 0.0).map(|row| row.1));
-    let (first_phi, last_phi) = (*phis.first()?, *phis.last()?);
-    let has_pole = thetas.first() == Some(&0.0);
-    let nodes = (thetas.len() - usize::from(has_pole)) * phis.len() + usize::from(has_pole);
-    let regular = thetas.len() > 1 && phis.len() > 1 && thetas.first()? >= &0.0 && last_phi - first_phi <= 360.0;
-    if !regular || 4 * block.scatter.len() < 3 * nodes || block.scatter.len() > nodes {
+    let (first_theta, first_phi, last_phi) = (*thetas.first()?, *phis.first()?, *phis.last()?);
+    let mirrored = first_phi >= 0.0 && last_phi <= 180.0;
+    let regular = thetas.len() > 1 && phis.len() > 2 && first_theta >= 0.0 && last_phi - first_phi <= 360.0;
+    if !regular || largest_gap(&phis, mirrored) > LARGEST_GAP_DEG {
         return None;
     }
-    let polar = cells::polar(&thetas);
-    let azimuth = cells::azimuth(&phis, first_phi >= 0.0 && last_phi <= 180.0);
-    let cell = |&(theta, phi): &(f64, f64)| {
-        let ring = polar.get(position(&thetas, theta)?)?;
-        // At the pole one row stands for the whole circle.
-        let width = if theta == 0.0 { std::f64::consts::TAU } else { *azimuth.get(position(&phis, phi)?)? };
-        Some(ring * width)
+    // The pole is one node, whatever azimuths it is listed at.
+    let node = |&(theta, phi): &(f64, f64)| {
+        let column = if theta == 0.0 { 0 } else { position(&phis, phi)? };
+        Some((position(&thetas, theta)?, column))
     };
-    block.scatter.iter().map(cell).collect()
+    let nodes: Vec<(usize, usize)> = block.scatter.iter().map(node).collect::<Option<_>>()?;
+    let mut rows: BTreeMap<(usize, usize), u32> = BTreeMap::new();
+    nodes.iter().for_each(|node| *rows.entry(*node).or_default() += 1);
+    let pole = usize::from(first_theta == 0.0);
+    if 4 * rows.len() < 3 * ((thetas.len() - pole) * phis.len() + pole) {
+        return None;
+    }
+    let (polar, azimuth) = (cells::polar(&thetas), cells::azimuth(&phis, mirrored));
+    let cell = |node: &(usize, usize)| {
+        let width = if node.0 < pole { TAU } else { *azimuth.get(node.1)? };
+        Some(polar.get(node.0)? * width / f64::from(*rows.get(node)?))
+    };
+    nodes.iter().map(cell).collect()
+}
+
+/// Widest gap (deg) between ascending azimuths round the circle; with `mirrored` each stands for its mirror image too.
+fn largest_gap(phis: &[f64], mirrored: bool) -> f64 {
+    let (Some(first), Some(last)) = (phis.first(), phis.last()) else { return 360.0 };
+    let inner = phis.windows(2).map(|w| w[1] - w[0]);
+    let ends = if mirrored { [2.0 * first, 2.0 * (180.0 - last)] } else { [first + 360.0 - last; 2] };
+    inner.chain(ends).fold(0.0, f64::max)
 }
 
 /// The values, sorted, each once.

@@ -9,7 +9,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::source::Source;
-use super::{ReadOptions, WriteReport};
+use super::{Quantity, ReadOptions, WriteReport};
 use crate::measurement::{Directions, Masked, Measurement, MeasurementError, MerlGrid, Weights};
 
 /// Bins in θh, θd, φd.
@@ -30,6 +30,10 @@ const PIECE: usize = MerlGrid::THETA_D * MerlGrid::PHI_D;
 /// Reads a table; `options` says where in its bin an entry is read.
 pub(super) fn read(source: &Source, options: &ReadOptions) -> Result<Measurement, MeasurementError> {
     check_header(source)?;
+    if options.quantity == Some(Quantity::BrdfCos) {
+        let reason = "a MERL table holds the BRDF by definition; read it without --quantity brdf_cos";
+        return Err(MeasurementError::unsupported(source.path(), reason));
+    }
     // Nothing is allocated before the length is known to be right; the pieces go straight to their places.
     let mut values = vec![0.0; 3 * MerlGrid::LEN];
     let masks: Vec<Masked> = values

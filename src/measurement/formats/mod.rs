@@ -1,14 +1,16 @@
 //! File formats, one file each. Content is sniffed; a name's extension only chooses what to write.
 //!
 //! In: a path (`-` is stdin) and [`ReadOptions`]. Out: a [`Measurement`], or a [`MeasurementError`] that names file, place, what was
-//! expected and what was found. The one decision to know: a direction at or below the horizon is no error in a listed table;
+//! expected and what was found. The one decision to know: a direction below the horizon is no error in a listed table;
 //! its values are masked, and a note says how many and where the first stands. (A table on the MERL grid keeps them: the
-//! format itself marks what is not measured.)
+//! format itself marks what is not measured.) On the horizon itself values are masked where a cosine would have to be
+//! divided out, and in the flat world.
 
 mod alta;
 mod cells;
 mod csv;
 mod fred;
+mod limits;
 mod merl;
 pub mod rgl;
 mod rows;
@@ -21,7 +23,7 @@ use std::io::Write;
 use std::path::Path;
 
 use self::source::Source;
-use super::{Measurement, MeasurementError, MerlAngles};
+use super::{Dimension, Directions, Measurement, MeasurementError, MerlAngles, Weights};
 
 /// The formats that goniofit reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,7 +112,8 @@ pub enum Quantity {
 pub struct ReadOptions {
     /// Overrides what sniffing finds.
     pub format: Option<Format>,
-    /// Overrides what the file says of its quantity (not for MERL and RGL files, whose format defines it).
+    /// Overrides what the file says of its quantity. A MERL table is the BRDF and an RGL file BRDF·cosθo by definition: the other
+    /// one is refused for them.
     pub quantity: Option<Quantity>,
     /// Where in its bin a MERL entry is read.
     pub merl_angles: MerlAngles,
@@ -143,8 +146,38 @@ pub fn read_bytes(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<
     read_source(&Source::from_bytes(path, bytes), options)
 }
 
+/// Reads what a scan needs: the directions of a measurement, or of a CSV file that holds no values, with their weights. Directions
+/// below the horizon are kept. The path `-` is stdin.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_directions(
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<(Directions, Weights, Dimension), MeasurementError> {
+    let source = Source::open(path)?;
+    let table = match format_of(&source, options)? {
+        Format::Csv => csv::read_directions(&source, options),
+        _ => read_source(&source, options),
+    }?;
+    Ok((table.directions, table.weights, table.dimension))
+}
+
+/// The bytes of an input that can be read only once (`-` is stdin, a pipe), at most 1 GiB: whoever looks at its beginning before
+/// choosing a reader hands them on to [`read_bytes`]. `None` for a regular file, which is better read in place.
+///
+/// # Errors
+/// As [`read`], for what can't be opened, a directory, and a stream of more than 1 GiB.
+pub fn read_stream(path: &Path) -> Result<Option<Vec<u8>>, MeasurementError> {
+    Source::open(path).map(Source::into_stream)
+}
+
+fn format_of(source: &Source, options: &ReadOptions) -> Result<Format, MeasurementError> {
+    options.format.map_or_else(|| sniff::sniff(source), Ok)
+}
+
 fn read_source(source: &Source, options: &ReadOptions) -> Result<Measurement, MeasurementError> {
-    let format = options.format.map_or_else(|| sniff::sniff(source), Ok)?;
+    let format = format_of(source, options)?;
     let mut measurement = match format {
         Format::Merl => merl::read(source, options),
         Format::Csv => csv::read(source, options),

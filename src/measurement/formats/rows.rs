@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Quantity;
-use crate::measurement::{Directions, Masked, Measurement};
+use crate::measurement::{Dimension, Directions, Masked, Measurement};
 
 /// A direction with |cosθ| up to this counts as on the horizon: 90° written with 15 digits, or as the hypotenuse of two
 /// angles, is off by some 10⁻¹⁶ to 10⁻¹⁵ rad, and no goniometer is set to 10⁻¹² rad.
@@ -12,6 +12,7 @@ const HORIZON: f64 = 1e-12;
 /// Rows of a listed table.
 #[derive(Debug)]
 pub(super) struct Rows {
+    dimension: Dimension,
     quantity: Quantity,
     wi: Vec<DVec3>,
     wo: Vec<DVec3>,
@@ -60,9 +61,15 @@ impl Divisor {
 }
 
 impl Rows {
-    /// No rows yet, `channels` values each.
+    /// No rows yet, `channels` values each, of space.
     pub(super) fn new(channels: usize, quantity: Quantity) -> Self {
+        Self::of_world(Dimension::Space, channels, quantity)
+    }
+
+    /// No rows yet, `channels` values each. In the flat world the horizon itself is masked: its directions end there.
+    pub(super) fn of_world(dimension: Dimension, channels: usize, quantity: Quantity) -> Self {
         Self {
+            dimension,
             quantity,
             wi: Vec::new(),
             wo: Vec::new(),
@@ -81,7 +88,8 @@ impl Rows {
     pub(super) fn directions(&mut self, wi: DVec3, wo: DVec3) -> Divisor {
         self.wi.push(wi);
         self.wo.push(wo);
-        Divisor::of(self.quantity, wi, wo)
+        let horizon = self.dimension == Dimension::Flat && (wi.z <= HORIZON || wo.z <= HORIZON);
+        if horizon { Divisor::None } else { Divisor::of(self.quantity, wi, wo) }
     }
 
     /// Adds a value to `channel`: `None` where the file marks it as not measured. `place` is asked for where the value can't
@@ -115,7 +123,7 @@ impl Rows {
         }
     }
 
-    /// The finished table of space, its directions listed.
+    /// The finished table, its directions listed.
     pub(super) fn finish(mut self, name: String, channels: Vec<String>) -> Measurement {
         let list = Directions::List { wi: std::mem::take(&mut self.wi), wo: std::mem::take(&mut self.wo) };
         self.finish_with(name, channels, list)
@@ -124,9 +132,11 @@ impl Rows {
     /// The finished table with these `directions`.
     pub(super) fn finish_with(self, name: String, channels: Vec<String>, directions: Directions) -> Measurement {
         let mut measurement = Measurement::new(name, directions, channels, concat(self.columns));
+        measurement.dimension = self.dimension;
         measurement.masked = self.masked;
         measurement.notes.extend(self.horizon.first.map(|first| {
             let what = match self.quantity {
+                _ if self.dimension == Dimension::Flat => "at the horizon",
                 Quantity::Brdf => "below the horizon",
                 Quantity::BrdfCos => "at or below the horizon, where BRDF·cosθo gives no BRDF",
             };

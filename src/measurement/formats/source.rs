@@ -52,9 +52,18 @@ impl Source {
         Ok(Self::from_bytes(path, bytes))
     }
 
-    /// An input held in memory.
+    /// An input held in memory; `-` is stdin.
     pub(super) fn from_bytes(path: &Path, bytes: Vec<u8>) -> Self {
+        let path = if path == Path::new("-") { Path::new("stdin") } else { path };
         Self { path: path.into(), content: Content::Memory(bytes) }
+    }
+
+    /// The bytes of a stream; `None` for a regular file.
+    pub(super) fn into_stream(self) -> Option<Vec<u8>> {
+        match self.content {
+            Content::File { .. } => None,
+            Content::Memory(bytes) => Some(bytes),
+        }
     }
 
     /// What messages call it.
@@ -141,6 +150,8 @@ mod tests {
         assert!(error.to_string().contains("more than 1000 bytes"), "{error}");
         let whole = Source::from_stream(Path::new("stdin"), &b"abc"[..], 3).expect("fits");
         assert_eq!((whole.len(), whole.head(2).expect("head")), (3, b"ab".to_vec()));
+        assert_eq!(whole.into_stream(), Some(b"abc".to_vec()));
+        assert_eq!(Source::from_bytes(Path::new("-"), Vec::new()).name(), "stdin");
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! A measured table as a BRDF to render.
 //!
 //! In: a [`Measurement`] and the channels to show. Out: [`TableBrdf`], which evaluates between the measured directions and
-//! draws directions in proportion to what the table reflects. The one decision to know: nothing is extrapolated. Where the
-//! measurement says nothing, [`Brdf::eval`] answers `false` with zeros, and the caller shows the place as unmeasured.
+//! draws directions in proportion to what the table reflects. The one decision to know: beyond the measured directions nothing
+//! is extrapolated. There [`Brdf::eval`] answers `false` with zeros, and the caller shows the place as unmeasured.
 //!
 //! - A MERL grid is interpolated linearly in index space (`merl`).
-//! - A file with an evaluation of its own (RGL) keeps it, its sampling included.
+//! - A file with an evaluation of its own (RGL) keeps it, its sampling included. Between the stored incidences that evaluation
+//!   fills the gaps which the file marks as not measured.
 //! - Listed isotropic samples are interpolated per incidence over a triangulation, and linearly between incidences at a
 //!   constant offset from the mirror direction (`scattered`, `mesh`). Tables that can't carry that are refused, with the
 //!   reason.

@@ -1,5 +1,8 @@
 //! The comments and the header line: what each column holds.
 
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use super::Needs;
 use super::{ANGLES, FLAT_ANGLES, GRIDS, SOLID_ANGLE, is_reserved};
 use crate::measurement::formats::Quantity;
 use crate::measurement::formats::text::{Line, Lines, quoted};
@@ -30,14 +33,14 @@ pub(super) struct Columns {
     pub(super) weight: Option<usize>,
 }
 
-/// Reads the `#` lines and the header.
-pub(super) fn read(lines: &mut Lines<'_>) -> Result<(Comments, Columns), MeasurementError> {
+/// Reads the `#` lines and the header, which must hold what `needs` says.
+pub(super) fn read(lines: &mut Lines<'_>, needs: Needs) -> Result<(Comments, Columns), MeasurementError> {
     let mut comments = Comments::default();
     while let Some(line) = lines.next_filled()? {
         if let Some(comment) = line.text.trim_start().strip_prefix('#') {
             comments.take(line, comment)?;
         } else {
-            let columns = Columns::parse(line, comments.dimension)?;
+            let columns = Columns::parse(line, comments.dimension, needs)?;
             return comments.check(line).map(|()| (comments, columns));
         }
     }
@@ -86,7 +89,7 @@ impl Comments {
 
 impl Columns {
     /// Sorts the names of the header line.
-    fn parse(line: Line<'_>, dimension: Dimension) -> Result<Self, MeasurementError> {
+    fn parse(line: Line<'_>, dimension: Dimension, needs: Needs) -> Result<Self, MeasurementError> {
         let names = split(line)?;
         refuse_doubles(line, &names)?;
         refuse_raw_readings(line, &names)?;
@@ -102,12 +105,13 @@ impl Columns {
             return Err(line.invalid("header", expected, quoted(extra)));
         }
         let channels: Vec<usize> = (0..names.len()).filter(|&i| !is_reserved(&names[i])).collect();
-        if channels.is_empty() {
+        if channels.is_empty() && needs == Needs::Values {
             let expected = "a column of values besides the angles, under the channel's name";
             return Err(line.invalid("header", expected, quoted(line.text)));
         }
-        let sigma = per_channel(line, &names, &channels, "sigma_")?;
-        let common = shared_components(line, &names, &channels)?;
+        let of_channels = OfChannels::new(line, &names, &channels);
+        let sigma = of_channels.columns("sigma_", &with_prefix(&names, "sigma_"))?;
+        let common = shared_components(&of_channels, &names)?;
         let weight = find("weight");
         Ok(Self { names, angles, channels, sigma, common, weight })
     }
@@ -137,8 +141,9 @@ fn split(line: Line<'_>) -> Result<Vec<String>, MeasurementError> {
 }
 
 fn refuse_doubles(line: Line<'_>, names: &[String]) -> Result<(), MeasurementError> {
-    match names.iter().enumerate().find(|(i, name)| names.iter().take(*i).any(|n| n == *name)) {
-        Some((_, name)) => Err(line.invalid("header", "each column once", format!("{} twice", quoted(name)))),
+    let mut seen = HashSet::with_capacity(names.len());
+    match names.iter().find(|name| !seen.insert(name.as_str())) {
+        Some(name) => Err(line.invalid("header", "each column once", format!("{} twice", quoted(name)))),
         None => Ok(()),
     }
 }
@@ -163,48 +168,71 @@ fn missing(line: Line<'_>, name: &str, dimension: Dimension) -> MeasurementError
     line.invalid("header", format!("a column {name}{hint}"), quoted(line.text))
 }
 
-/// The columns `<prefix><channel>` of all channels, or of none.
-fn per_channel(
-    line: Line<'_>,
-    names: &[String],
-    channels: &[usize],
-    prefix: &str,
-) -> Result<Vec<usize>, MeasurementError> {
-    let of_channel = |c: &usize| names.iter().position(|n| n.strip_prefix(prefix) == names.get(*c).map(String::as_str));
-    let known: Vec<Option<usize>> = channels.iter().map(of_channel).collect();
-    let stray = (0..names.len()).find(|i| names[*i].starts_with(prefix) && !known.contains(&Some(*i)));
-    let list = |c: &[usize]| c.iter().filter_map(|&i| names.get(i).map(String::as_str)).collect::<Vec<_>>().join(", ");
-    if let Some(stray) = stray {
-        let expected = format!("{prefix} and the name of a channel ({})", list(channels));
-        return Err(line.invalid("header", expected, quoted(&names[stray])));
-    }
-    if known.iter().all(Option::is_none) {
-        return Ok(Vec::new());
-    }
-    known.into_iter().collect::<Option<_>>().ok_or_else(|| {
-        line.invalid(
-            "header",
-            format!("{prefix}… for every channel ({}) or for none", list(channels)),
-            quoted(line.text),
-        )
-    })
+/// A column and what its name holds besides the prefix.
+type Suffixed<'a> = (usize, &'a str);
+
+/// The columns whose names begin with `prefix`.
+fn with_prefix<'a>(names: &'a [String], prefix: &str) -> Vec<Suffixed<'a>> {
+    names.iter().enumerate().filter_map(|(i, name)| Some((i, name.strip_prefix(prefix)?))).collect()
 }
 
-/// The columns `common_<k>_<channel>`, by ascending k.
-fn shared_components(
-    line: Line<'_>,
-    names: &[String],
-    channels: &[usize],
-) -> Result<Vec<Vec<usize>>, MeasurementError> {
-    let mut keys: Vec<u32> = Vec::new();
-    for name in names {
-        let Some(rest) = name.strip_prefix("common_") else { continue };
-        let key = rest.split_once('_').and_then(|(k, _)| k.parse().ok());
-        let key = key.ok_or_else(|| line.invalid("header", "common_<number>_<channel>", quoted(name)))?;
-        if !keys.contains(&key) {
-            keys.push(key);
-        }
+/// Finds the columns that belong to channels.
+struct OfChannels<'a> {
+    line: Line<'a>,
+    names: &'a [String],
+    channels: &'a [usize],
+    /// Number of each channel by its name.
+    numbers: HashMap<&'a str, usize>,
+}
+
+impl<'a> OfChannels<'a> {
+    fn new(line: Line<'a>, names: &'a [String], channels: &'a [usize]) -> Self {
+        let numbers = channels.iter().enumerate().filter_map(|(c, &i)| Some((names.get(i)?.as_str(), c))).collect();
+        Self { line, names, channels, numbers }
     }
-    keys.sort_unstable();
-    keys.iter().map(|k| per_channel(line, names, channels, &format!("common_{k}_"))).collect()
+
+    /// The `group` of columns `<prefix><channel>`, one for each channel in the channels' order, or none.
+    fn columns(&self, prefix: &str, group: &[Suffixed<'_>]) -> Result<Vec<usize>, MeasurementError> {
+        let mut ranked = Vec::with_capacity(group.len());
+        for &(column, channel) in group {
+            let Some(number) = self.numbers.get(channel) else {
+                let expected = format!("{prefix} and the name of a channel ({})", self.list());
+                return Err(self.line.invalid("header", expected, quoted(&self.names[column])));
+            };
+            ranked.push((*number, column));
+        }
+        if !group.is_empty() && group.len() != self.channels.len() {
+            let expected = format!("{prefix}… for every channel ({}) or for none", self.list());
+            return Err(self.line.invalid("header", expected, quoted(self.line.text)));
+        }
+        // No name stands twice, so each channel is met once.
+        ranked.sort_unstable();
+        Ok(ranked.into_iter().map(|(_, column)| column).collect())
+    }
+
+    /// The channels' names, the first ten of many.
+    fn list(&self) -> String {
+        let shown = self.channels.iter().take(10).filter_map(|&i| self.names.get(i).map(String::as_str));
+        let more = if self.channels.len() > 10 { ", …" } else { "" };
+        shown.collect::<Vec<_>>().join(", ") + more
+    }
+}
+
+/// The columns `common_<k>_<channel>`, by ascending k, one for each channel.
+fn shared_components(channels: &OfChannels<'_>, names: &[String]) -> Result<Vec<Vec<usize>>, MeasurementError> {
+    let mut components: BTreeMap<u32, Vec<Suffixed<'_>>> = BTreeMap::new();
+    for (column, rest) in with_prefix(names, "common_") {
+        let parts = rest.split_once('_').and_then(|(k, channel)| Some((plain_number(k)?, channel)));
+        let Some((k, channel)) = parts else {
+            let expected = "common_<number>_<channel>, the number in plain digits (1, not 01 or +1)";
+            return Err(channels.line.invalid("header", expected, quoted(&names[column])));
+        };
+        components.entry(k).or_default().push((column, channel));
+    }
+    components.iter().map(|(k, group)| channels.columns(&format!("common_{k}_"), group)).collect()
+}
+
+/// The number that `text` is the plain form of: one number has one name only.
+fn plain_number(text: &str) -> Option<u32> {
+    text.parse().ok().filter(|number: &u32| number.to_string() == text)
 }

@@ -1,11 +1,13 @@
 //! goniofit's own CSV: `#` lines, a header line, one row a pair of directions.
 //!
 //! Columns stand in any order: `theta_i_deg`, `phi_i_deg`, `theta_o_deg`, `phi_o_deg`; one per channel, under any other name, in 1/sr; `sigma_<channel>`
-//! (≥ 0, 0 is exact), for every channel or none; `common_<k>_<channel>` (1 σ, signed), component by component for every channel;
+//! (≥ 0, 0 is exact), for every channel or none; `common_<k>_<channel>` (1 σ, signed; k in plain digits), component by component
+//! for every channel;
 //! `weight` (≥ 0). An empty value is masked as not measured, `nan` and `inf` as not finite. Comments that mean something:
 //!
 //! - `# quantity: brdf` (default) or `brdf_cos`;
-//! - `# dimension: 2`: the flat world, columns `theta_i_deg` and `theta_o_deg` in [−90, 90], values in 1/rad;
+//! - `# dimension: 2`: the flat world, columns `theta_i_deg` and `theta_o_deg` in [−90, 90], values in 1/rad, masked at ±90, where the
+//!   cosine is 0;
 //! - `# grid: merl-center` or `merl-edge`: the rows are the MERL grid's 1,458,000 entries in order, which is checked; solid angles and
 //!   grid interpolation then work as from a MERL file;
 //! - `# weights: solid-angle`: the `weight` column holds the solid angles of a grid.
@@ -14,10 +16,19 @@ mod header;
 mod read;
 mod write;
 
-pub(super) use read::read;
+pub(super) use read::{read, read_directions};
 pub(super) use write::write;
 
 use crate::measurement::MerlAngles;
+
+/// What a file must hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Needs {
+    /// Directions; values may be missing.
+    Directions,
+    /// Directions and at least one channel of values.
+    Values,
+}
 
 /// Names of the angle columns, in the order written.
 const ANGLES: [&str; 4] = ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"];

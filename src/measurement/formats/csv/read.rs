@@ -2,13 +2,15 @@
 
 use glam::DVec3;
 
+use super::Needs;
 use super::header::{self, Columns, Comments};
 use crate::geometry::angles::direction_deg;
+use crate::measurement::formats::limits::{AZIMUTH_DEG, FLAT_POLAR_DEG, Limit, POLAR_DEG};
 use crate::measurement::formats::rows::{Divisor, Rows, concat};
 use crate::measurement::formats::source::Source;
 use crate::measurement::formats::text::{Line, Lines, quoted};
 use crate::measurement::formats::{Quantity, ReadOptions};
-use crate::measurement::{Directions, Measurement, MeasurementError, MerlGrid, Weights};
+use crate::measurement::{Dimension, Directions, Measurement, MeasurementError, MerlGrid, Weights};
 
 /// How far (rad) a row's directions may be from the MERL grid's: wider than any rounding, narrower than any bin.
 const GRID_TOLERANCE: f64 = 1e-7;
@@ -18,8 +20,20 @@ pub(in crate::measurement::formats) fn read(
     source: &Source,
     options: &ReadOptions,
 ) -> Result<Measurement, MeasurementError> {
+    read_table(source, options, Needs::Values)
+}
+
+/// Reads the directions and weights of a CSV file that need not hold values: without any the table has no channel.
+pub(in crate::measurement::formats) fn read_directions(
+    source: &Source,
+    options: &ReadOptions,
+) -> Result<Measurement, MeasurementError> {
+    read_table(source, options, Needs::Directions)
+}
+
+fn read_table(source: &Source, options: &ReadOptions, needs: Needs) -> Result<Measurement, MeasurementError> {
     let mut lines = Lines::new(source)?;
-    let (comments, columns) = header::read(&mut lines)?;
+    let (comments, columns) = header::read(&mut lines, needs)?;
     let mut table = Table::new(&comments, &columns, options.quantity.unwrap_or(comments.quantity));
     let mut cells = Vec::new();
     while let Some(line) = lines.next_filled()? {
@@ -28,7 +42,7 @@ pub(in crate::measurement::formats) fn read(
         table.row(line, &cells)?;
     }
     let expected = comments.grid.map_or(1, |_| MerlGrid::LEN);
-    if table.rows.len() < expected {
+    if table.read < expected {
         let rows = if expected == 1 { "a row of data".into() } else { format!("{expected} rows of the MERL grid") };
         return Err(lines.ends_too_early(rows));
     }
@@ -50,6 +64,8 @@ struct Table<'a> {
     columns: &'a Columns,
     quantity: Quantity,
     rows: Rows,
+    /// Rows read so far.
+    read: usize,
     sigma: Vec<Vec<f64>>,
     common: Vec<Vec<Vec<f64>>>,
     weight: Vec<f64>,
@@ -62,7 +78,8 @@ impl<'a> Table<'a> {
             comments,
             columns,
             quantity,
-            rows: Rows::new(channels, quantity),
+            rows: Rows::of_world(comments.dimension, channels, quantity),
+            read: 0,
             sigma: vec![Vec::new(); columns.sigma.len()],
             common: vec![vec![Vec::new(); channels]; columns.common.len()],
             weight: Vec::new(),
@@ -88,6 +105,7 @@ impl<'a> Table<'a> {
         if let Some(column) = columns.weight {
             self.weight.push(not_negative(line, &columns.label(column), cell(column))?);
         }
+        self.read += 1;
         Ok(())
     }
 
@@ -98,19 +116,18 @@ impl<'a> Table<'a> {
         cell: &impl Fn(usize) -> &'t str,
     ) -> Result<Divisor, MeasurementError> {
         let columns = self.columns;
-        let angle = |&column: &usize| line.finite(&columns.label(column), cell(column));
-        let angles: Vec<f64> = columns.angles.iter().map(angle).collect::<Result<_, _>>()?;
+        let limits: &[Limit] = match self.comments.dimension {
+            Dimension::Space => &[POLAR_DEG, AZIMUTH_DEG, POLAR_DEG, AZIMUTH_DEG],
+            Dimension::Flat => &[FLAT_POLAR_DEG, FLAT_POLAR_DEG],
+        };
+        let angle = |(&column, limit): (&usize, &Limit)| {
+            let angle = line.finite(&columns.label(column), cell(column))?;
+            limit.check(line, || columns.label(column), angle)
+        };
+        let angles: Vec<f64> = columns.angles.iter().zip(limits).map(angle).collect::<Result<_, _>>()?;
         let (wi, wo) = match angles.as_slice() {
             [theta_i, phi_i, theta_o, phi_o] => (direction_deg(*theta_i, *phi_i), direction_deg(*theta_o, *phi_o)),
-            [theta_i, theta_o] => {
-                for (&column, theta) in columns.angles.iter().zip([theta_i, theta_o]) {
-                    if theta.abs() > 90.0 {
-                        let expected = "an angle between −90 and 90 degrees";
-                        return Err(line.invalid(&columns.label(column), expected, theta.to_string()));
-                    }
-                }
-                (direction_deg(*theta_i, 0.0), direction_deg(*theta_o, 0.0))
-            }
+            [theta_i, theta_o] => (direction_deg(*theta_i, 0.0), direction_deg(*theta_o, 0.0)),
             _ => (DVec3::NAN, DVec3::NAN),
         };
         let Some(grid) = self.comments.grid else { return Ok(self.rows.directions(wi, wo)) };
@@ -120,7 +137,7 @@ impl<'a> Table<'a> {
     }
 
     fn check_grid(&self, line: Line<'_>, grid: MerlGrid, wi: DVec3, wo: DVec3) -> Result<(), MeasurementError> {
-        let index = self.rows.len();
+        let index = self.read;
         if index >= MerlGrid::LEN {
             let expected = format!("no more than the {} rows of the MERL grid", MerlGrid::LEN);
             return Err(line.invalid("", expected, "another row"));
@@ -178,7 +195,6 @@ impl<'a> Table<'a> {
             Some(angles) => self.rows.finish_with(name, channels, Directions::Merl(MerlGrid { angles })),
             None => self.rows.finish(name, channels),
         };
-        measurement.dimension = self.comments.dimension;
         measurement.sigma = (!self.sigma.is_empty()).then(|| concat(self.sigma));
         measurement.common = self.common.into_iter().map(concat).collect();
         measurement.weights = match (self.columns.weight, self.comments.grid) {

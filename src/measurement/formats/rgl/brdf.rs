@@ -39,8 +39,9 @@ impl Symmetry {
     }
 }
 
-/// A measured BRDF in the adaptive parameterisation. It is evaluated wherever both directions are above the horizon, also in
-/// the gaps of the measurement, as its authors do; negative values are colours out of gamut and are kept.
+/// A measured BRDF in the adaptive parameterisation. It is evaluated wherever both directions are above the horizon and θi lies
+/// between the stored incidences, also in the gaps that the file marks as not measured, as its authors do; negative values are
+/// colours out of gamut and are kept.
 ///
 /// Conditioned on the light (θi is the polar angle of `wi`), a file need not be reciprocal. What it stores is f cosθo, which the
 /// real files do not let vanish at the horizon: f grows as 1/cosθo over the last degree of θo, and ∫ f cosθi dωi
@@ -116,6 +117,9 @@ impl RglBrdf {
     /// from 0 there and dωm/du vanishes as u³. It is taken no nearer to it than this (θm = 1.6·10⁻¹² rad).
     const NEAREST: f64 = 1e-6;
 
+    /// Rounding of a stored angle (rad): the last place of single precision at π/2 is 1.2·10⁻⁷.
+    const ROUNDING: f64 = 1e-6;
+
     /// Channel names, in the order of the values.
     #[must_use]
     pub fn channel_names(&self) -> &[String] {
@@ -132,6 +136,12 @@ impl RglBrdf {
     #[must_use]
     pub fn incidences(&self) -> &[f64] {
         &self.theta_i
+    }
+
+    /// Whether the polar angle of incidence `theta_i` (rad) lies between stored ones, but for their rounding in single precision.
+    fn stores(&self, theta_i: f64) -> bool {
+        let (first, last) = (self.theta_i.first(), self.theta_i.last());
+        first.is_some_and(|f| theta_i >= f - Self::ROUNDING) && last.is_some_and(|l| theta_i <= l + Self::ROUNDING)
     }
 
     /// The incidence `wi`, already turned into the stored azimuths.
@@ -189,11 +199,14 @@ impl Brdf for RglBrdf {
         self.channels.len()
     }
 
-    /// Unknown only where the file holds a value that is not finite.
+    /// Unknown beyond the stored polar angles of incidence, and where the file holds a value that is not finite.
     fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool {
         out.fill(0.0);
         if !above(wi, wo) {
             return true;
+        }
+        if !self.stores(theta_of(wi)) {
+            return false;
         }
         let signs = self.symmetry.signs(wi).extend(1.0);
         let (wi, wo) = (wi * signs, wo * signs);

@@ -122,6 +122,21 @@ fn a_value_that_is_not_finite_is_masked_counted_and_unknown_to_the_evaluator() {
 }
 
 #[test]
+fn beyond_the_last_stored_incidence_nothing_is_known() {
+    let (path, mut bytes) = fixture("rgl-tiny.bsdf");
+    let words: Vec<u8> = [1.3f32, 1.570_796_1].iter().flat_map(|theta| theta.to_le_bytes()).collect();
+    let at = bytes.windows(8).position(|w| w == words).expect("the last two incidences");
+    bytes[at + 4..at + 8].copy_from_slice(&1.4f32.to_le_bytes());
+    let brdf = read_brdf(&path, &bytes).expect("valid");
+    let wo = crate::geometry::direction(0.5, 2.0);
+    for (theta_i, known) in [(0.0, true), (1.3, true), (1.4, true), (1.4 + 1e-5, false), (1.55, false)] {
+        let mut out = [1.0; 3];
+        let found = crate::brdf::Brdf::eval(&brdf, crate::geometry::direction(theta_i, 0.3), wo, &mut out);
+        assert_eq!((found, out.iter().all(|v| *v > 0.0)), (known, known), "{theta_i}: {out:?}");
+    }
+}
+
+#[test]
 fn spectral_files_have_a_channel_per_wavelength_and_valid_bits_of_either_polarity() {
     let (path, bytes) = fixture("rgl-spectral.bsdf");
     let table = read_default(&path, &bytes).expect("valid");
