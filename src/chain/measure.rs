@@ -6,7 +6,7 @@ use crate::brdf::{Brdf, Material};
 use crate::control::Control;
 use crate::gonio::{Instrument, Scan, simulate};
 use crate::measurement::interpolate::TableBrdf;
-use crate::measurement::{Dimension, Directions, Measurement};
+use crate::measurement::{Dimension, Measurement};
 
 /// Measures a material or table along a scan.
 ///
@@ -49,13 +49,6 @@ pub fn tabulate(name: &str, material: &Material, scan: &Scan, control: Control<'
     let mut table = measure(name, &source, &Instrument::noiseless(), scan, 0, control)?;
     table.origin = format!("{} sampled on {scan}", material.model());
     Ok(table)
-}
-
-/// The directions of a measurement as a scan.
-#[must_use]
-pub fn scan_of(name: &str, table: &Measurement) -> Scan {
-    let directions: Directions = table.directions.clone();
-    Scan::List { name: name.into(), directions, weights: table.weights.clone(), dimension: table.dimension }
 }
 
 fn same_world(name: &str, flat: bool, scan: Dimension) -> Result<(), ChainError> {

@@ -40,13 +40,8 @@ pub fn load(name: &str, options: &ReadOptions) -> Result<Source, ChainError> {
         return Ok(Source::Fitted(Box::new(built_in.material())));
     }
     let path = Path::new(name);
-    if name == "-" {
-        return from_bytes(path, read_stream(path, std::io::stdin().lock())?, options);
-    }
-    // A pipe gives its bytes once: they are read before they are looked at.
-    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        let pipe = std::fs::File::open(path).map_err(|source| ChainError::io(path, source))?;
-        return from_bytes(path, read_stream(path, pipe)?, options);
+    if let Some(bytes) = stream(path)? {
+        return from_bytes(path, bytes, options);
     }
     if !path.exists() && path.extension().is_none() {
         let known = MATERIALS.map(|m| m.name).join(", ");
@@ -71,18 +66,11 @@ pub fn load_material(name: &str) -> Result<Material, ChainError> {
     }
 }
 
-/// Most bytes taken from a stream: thirty MERL tables.
-const STREAM_LIMIT: u64 = 1 << 30;
-
-fn read_stream(path: &Path, stream: impl Read) -> Result<Vec<u8>, ChainError> {
-    let mut bytes = Vec::new();
-    stream.take(STREAM_LIMIT + 1).read_to_end(&mut bytes).map_err(|source| ChainError::io(path, source))?;
-    if bytes.len() as u64 > STREAM_LIMIT {
-        let reason =
-            std::io::Error::other(format!("a stream of more than {STREAM_LIMIT} bytes is not read; save it to a file"));
-        return Err(ChainError::io(path, reason));
-    }
-    Ok(bytes)
+/// The bytes of a pipe, which gives them once: they are read before they are looked at. What can't be opened is left to the
+/// reader, who says why.
+fn stream(path: &Path) -> Result<Option<Vec<u8>>, ChainError> {
+    let there = path == Path::new("-") || path.exists();
+    Ok(if there { formats::read_stream(path)? } else { None })
 }
 
 /// Whether the first byte that is not blank is `{`. What can't be opened is left to the reader, who says why.

@@ -21,8 +21,8 @@ pub(super) struct Args {
     /// The truth: a built-in material (see `goniofit models`), a fitted .json or a measurement
     #[arg(long, value_name = "M")]
     material: Option<String>,
-    /// Where to measure: in-plane[:STEP], hemisphere[:STEP], flat[:STEP] (degrees), merl, or list:FILE with the directions of
-    /// another measurement [default: hemisphere:5]
+    /// Where to measure: in-plane[:STEP], hemisphere[:STEP], flat[:STEP] (degrees), merl, or list:FILE with the directions in a
+    /// CSV or in another measurement [default: hemisphere:5]
     #[arg(long, value_name = "S")]
     scan: Option<String>,
     /// Seed of the noise [default: 0]
@@ -129,8 +129,8 @@ fn relative_to(base: &Path, name: &str) -> String {
 /// A scan as typed; `list:FILE` takes the directions and weights of that measurement.
 pub(super) fn parse_scan(text: &str) -> Result<Scan, Failure> {
     if let Some(file) = text.strip_prefix("list:") {
-        let table = formats::read(Path::new(file), &ReadOptions::default())?;
-        return Ok(chain::scan_of(file, &table));
+        let (directions, weights, dimension) = formats::read_directions(Path::new(file), &ReadOptions::default())?;
+        return Ok(Scan::List { name: file.into(), directions, weights, dimension });
     }
     text.parse().map_err(|e: crate::gonio::ScanError| Failure::usage(e.to_string()))
 }
