@@ -13,7 +13,7 @@ pub mod sheet;
 mod tone;
 
 pub use bitmap::{Bitmap, encode_png};
-pub use colormap::{ColorMap, DifferenceMap, difference_map};
+pub use colormap::{ColorMap, DifferenceMap, difference_map, difference_range};
 pub use compare::{Comparison, Significance, compare};
 pub use error::ImageError;
 pub use exr_file::{encode_exr, read_exr};
