@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Image, ImageError};
+use super::{Image, ImageError, MASKED_SHARE};
 use crate::numeric::stats::{sidak, two_sided_p};
 
 /// Added to the squared reference in [`Comparison::rel_mse`], so that dark pixels do not dominate, (W/(sr·m²))².
@@ -132,10 +132,10 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 impl Image {
-    /// Whether a part of pixel `i` is unknown.
+    /// Whether more of the light of pixel `i` is unknown than [`MASKED_SHARE`].
     #[must_use]
     pub fn is_masked(&self, i: usize) -> bool {
-        self.mask.as_ref().and_then(|mask| mask.get(i)).is_some_and(|share| *share > 0.0)
+        self.mask.as_ref().and_then(|mask| mask.get(i)).is_some_and(|share| *share > MASKED_SHARE)
     }
 
     /// Whether two pictures have the same size and layers of that size.
@@ -201,6 +201,13 @@ mod tests {
         image.radiance[2][1] = f64::NAN;
         let c = compare(&image, &reference).unwrap();
         assert!(c.rmse.is_nan() && c.max_abs.is_nan() && c.not_finite == 1);
+    }
+
+    #[test]
+    fn a_small_unknown_share_does_not_mask() {
+        let mut image = picture(4, 1, |_| 1.0);
+        image.mask = Some(vec![0.0, MASKED_SHARE, 1.01 * MASKED_SHARE, 1.0]);
+        assert_eq!(compare(&image, &picture(4, 1, |_| 1.0)).unwrap().masked, 2);
     }
 
     #[test]

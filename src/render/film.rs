@@ -77,7 +77,7 @@ impl Options {
 struct Pixel {
     rng: Stream,
     samples: u32,
-    unknown: u32,
+    unknown: f64,
     first: DVec3,
     sum: DVec3,
     squares: DVec3,
@@ -86,7 +86,7 @@ struct Pixel {
 impl Pixel {
     fn new(seed: u64, index: u64) -> Self {
         let rng = stream(seed, Purpose::Pixel, index);
-        Self { rng, samples: 0, unknown: 0, first: DVec3::ZERO, sum: DVec3::ZERO, squares: DVec3::ZERO }
+        Self { rng, samples: 0, unknown: 0.0, first: DVec3::ZERO, sum: DVec3::ZERO, squares: DVec3::ZERO }
     }
 
     fn add(&mut self, path: &PathResult) {
@@ -97,7 +97,7 @@ impl Pixel {
         self.sum += d;
         self.squares += d * d;
         self.samples += 1;
-        self.unknown += u32::from(path.unknown);
+        self.unknown += path.unknown;
     }
 
     fn mean(&self) -> DVec3 {
@@ -157,11 +157,14 @@ impl Film {
         self.pixels.iter().map(|p| u64::from(p.samples)).sum()
     }
 
-    /// The picture with its layers. `mask` is the share of a pixel's paths for which the surface seen is unknown towards the light,
-    /// and 1 where there are no samples.
+    /// The picture with its layers. `mask` is the mean over the pixel's paths of the largest weight at which each asked for a value
+    /// that nobody measured: the expected share of the pixel's light that is unknown, whatever the number of samples.
+    ///
+    /// A pixel without samples (of a render that was stopped early) has radiance 0, an infinite standard error and the mask 1,
+    /// so it takes part in no comparison; where there is one, `metadata.samples` is `Some(0)`.
     #[must_use]
     pub fn to_image(&self) -> Image {
-        let share = |p: &Pixel| if p.samples == 0 { 1.0 } else { f64::from(p.unknown) / f64::from(p.samples) };
+        let share = |p: &Pixel| if p.samples == 0 { 1.0 } else { p.unknown / f64::from(p.samples) };
         Image {
             width: self.width as usize,
             height: self.height as usize,
