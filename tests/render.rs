@@ -14,6 +14,7 @@ use glam::DVec3;
 use goniofit::brdf::{Brdf, Sample};
 use goniofit::control::{Control, Progress, Stop};
 use goniofit::geometry::{direction, sampling};
+use goniofit::image::{Image, compare};
 use goniofit::render::{Material, Materials, Options, PhongEquation, Scene, Strategy, render};
 
 /// A spot camera that looks at the point `at` of a Lambertian surface.
@@ -475,4 +476,48 @@ fn a_render_stopped_before_it_began_is_all_mask() {
     assert_eq!((film.samples(), image.metadata.samples), (0, Some(0)));
     assert_eq!((image.mask, image.radiance), (Some(vec![1.0; 64]), vec![[0.0; 3]; 64]));
     assert!(image.standard_error.iter().flatten().flatten().all(|e| *e == f64::INFINITY));
+}
+
+/// A built-in scene at 48 × 48 pixels, the albedo of its ball multiplied by `gain`.
+fn shot(name: &str, gain: f64, samples: u32, seed: u64) -> Image {
+    let mut spec = goniofit::render::scene::builtin(name).expect("built in");
+    let ball = spec.materials.get_mut("ball").expect("a ball");
+    ball.kd = ball.kd.map(|kd| kd.map(|k| gain * k));
+    picture(&Scene::build(&spec, Path::new("."), &Materials::new()).expect("builds"), 48, samples, seed).to_image()
+}
+
+/// In how many of ten pairs of pictures with different seeds the difference is said to be more than noise.
+fn flagged(name: &str, gain: f64, samples: (u32, u32)) -> usize {
+    let differs = |k: u64| {
+        let (a, b) = (shot(name, 1.0, samples.0, 100 + 2 * k), shot(name, gain, samples.1, 101 + 2 * k));
+        compare(&a, &b).expect("same size").significance.expect("enough samples")
+    };
+    let found: Vec<_> = (0..10).map(differs).collect();
+    let (z, mean) = (found.iter().map(|s| s.max_z), found.iter().map(|s| s.mean_z2).sum::<f64>() / 10.0);
+    println!("{name} × {gain}, {samples:?} samples: |z| up to {:.2}, mean z² {mean:.2}", z.fold(0.0, f64::max));
+    assert!(gain != 1.0 || (0.5..1.1).contains(&mean), "{name}: mean z² {mean}");
+    found.iter().filter(|s| s.differs).count()
+}
+
+#[test]
+fn noise_is_not_taken_for_a_difference() {
+    for samples in [(16, 16), (64, 64), (16, 256)] {
+        // Of 20 tests at 1 % more than 2 raise a false alarm with probability 0.001.
+        let alarms: usize = ["cornell", "sphere-on-plane"].map(|name| flagged(name, 1.0, samples)).iter().sum();
+        assert!(alarms <= 2, "{samples:?} samples: {alarms} of 20");
+    }
+}
+
+#[test]
+fn an_albedo_wrong_by_five_percent_is_found_with_64_samples() {
+    for name in ["cornell", "sphere-on-plane"] {
+        let found = flagged(name, 1.05, (64, 64));
+        assert!(found >= 9, "{name}: {found} of 10");
+    }
+}
+
+#[test]
+fn few_samples_are_not_judged() {
+    let c = compare(&shot("cornell", 1.0, 4, 1), &shot("cornell", 1.0, 64, 2)).expect("same size");
+    assert!(c.significance.is_none() && c.note.is_some_and(|note| note.contains("too few samples (4)")));
 }

@@ -10,13 +10,15 @@ mod compare;
 mod error;
 mod exr_file;
 pub mod sheet;
+mod significance;
 mod tone;
 
 pub use bitmap::{Bitmap, encode_png};
 pub use colormap::{ColorMap, DifferenceMap, difference_map, difference_range};
-pub use compare::{Comparison, Significance, compare};
+pub use compare::{Comparison, compare};
 pub use error::ImageError;
 pub use exr_file::{encode_exr, read_exr};
+pub use significance::Significance;
 pub use tone::{develop, exposure_for, srgb_encode};
 
 /// A pixel of whose light a larger share is unknown is masked. The share is an expected value, so more samples find it more
