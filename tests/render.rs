@@ -14,6 +14,7 @@ use glam::DVec3;
 use goniofit::brdf::{Brdf, Sample};
 use goniofit::control::{Control, Progress, Stop};
 use goniofit::geometry::{direction, sampling};
+use goniofit::image::{Image, compare};
 use goniofit::render::{Material, Materials, Options, PhongEquation, Scene, Strategy, render};
 
 /// A spot camera that looks at the point `at` of a Lambertian surface.
@@ -349,6 +350,89 @@ fn unmeasured_directions_are_shown_as_a_mask() {
     assert_eq!(lamp(0.3).mask, Some(vec![1.0]));
 }
 
+/// A BRDF with gaps: unknown where the light stands lower than the cosine `above`; else diffuse with albedo ½.
+struct Gap {
+    above: f64,
+}
+
+impl Brdf for Gap {
+    fn channels(&self) -> usize {
+        1
+    }
+    fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool {
+        let known = wi.z > self.above;
+        out[0] = if known && wi.z > 0.0 && wo.z > 0.0 { 0.5 / PI } else { 0.0 };
+        known
+    }
+    fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<Sample> {
+        Partial.sample(wo, u)
+    }
+    fn pdf(&self, wi: DVec3, wo: DVec3) -> f64 {
+        Partial.pdf(wi, wo)
+    }
+}
+
+fn with_gap(above: f64) -> Materials {
+    Materials::from([("gap".to_owned(), Material::Brdf(Arc::new(Gap { above })))])
+}
+
+#[test]
+fn more_samples_do_not_mask_more_pixels() {
+    let sky = "version = 1\nname = \"test\"\nmax_bounces = 1\n[camera]\nposition = [0, 4, 0]\ntarget = [0, 0, 0]\nup = [1, 0, 0]\n\
+               fov_deg = 20\n[materials]\ngap = { file = \"gap.csv\" }\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\n\
+               material = \"gap\"\n[light.environment]\nradiance = [1, 1, 1]\n";
+    // A path draws two directions, each in the gap with probability 0.05² = 0.0025: the share is 0.5 %, below 2 %.
+    let masked = |samples: u32| {
+        let image = picture(&scene_with(sky, &with_gap(0.05)), 32, samples, 1).to_image();
+        let share = image.mask.iter().flatten().sum::<f64>() / 1024.0;
+        let paths = f64::from(1024 * samples);
+        assert!((share - 0.005).abs() < 5.0 * (0.005 / paths).sqrt(), "{samples} samples: {share}");
+        (0..1024).filter(|i| image.is_masked(*i)).count()
+    };
+    // One of 16 paths is 6 %, as is bound to happen in 8 % of the pixels; 6 of 256 happen in 0.2 % of them.
+    let (few, many) = (masked(16), masked(256));
+    assert!(many <= few && many <= 10, "16 samples mask {few}, 256 mask {many}");
+    // Nothing is known: all is masked.
+    let image = picture(&scene_with(sky, &with_gap(1.0)), 8, 16, 1).to_image();
+    assert_eq!(image.mask, Some(vec![1.0; 64]));
+}
+
+#[test]
+fn gaps_seen_by_way_of_another_surface_count_by_its_reflectance() {
+    // The floor is seen; every path goes on to the ceiling, lit from below, of which nothing is known.
+    for (kd, want) in [([0.3, 0.1, 0.2], 0.3), ([0.01, 0.0, 0.01], 0.01), ([1.0; 3], 1.0)] {
+        let world = |lamp: f64| {
+            format!(
+                "{}[materials]\nm = {{ kd = {kd:?} }}\ngap = {{ file = \"gap.csv\" }}\n{GROUND}\
+                 [[plane]]\npoint = [0, 2, 0]\nnormal = [0, -1, 0]\nmaterial = \"gap\"\n\
+                 [[light.point]]\nposition = [0, {lamp}, 0]\nintensity = [1, 1, 1]\n",
+                spot_camera(DVec3::new(0.0, 1.0, 0.3), DVec3::ZERO, 2)
+            )
+        };
+        let share = |lamp| {
+            let image = picture(&scene_with(&world(lamp), &with_gap(1.0)), 1, 64, 1).to_image();
+            image.mask.expect("rendered")[0]
+        };
+        assert!((share(1.0) - want).abs() < 1e-12, "kd {kd:?}: {} vs {want}", share(1.0));
+        // A lamp behind the ceiling does not light it, so nothing is missing.
+        assert_eq!(share(3.0), 0.0);
+    }
+}
+
+#[test]
+fn a_hidden_light_asks_for_nothing() {
+    let share = |ball: f64| {
+        let world = format!(
+            "{}[materials]\ngap = {{ file = \"gap.csv\" }}\nb = {{ black = true }}\n[[plane]]\npoint = [0, 0, 0]\n\
+             normal = [0, 1, 0]\nmaterial = \"gap\"\n[[light.point]]\nposition = [2, 2, 0]\nintensity = [1, 1, 1]\n\
+             [[sphere]]\ncenter = [1, {ball}, 0]\nradius = 0.2\nmaterial = \"b\"\n",
+            spot_camera(DVec3::new(0.0, 1.0, 0.3), DVec3::ZERO, 1)
+        );
+        picture(&scene_with(&world, &with_gap(1.0)), 1, 4, 1).to_image().mask.expect("rendered")[0]
+    };
+    assert_eq!((share(1.0), share(9.0)), (0.0, 1.0));
+}
+
 /// Asks to stop after a number of reports.
 struct StopAfter<'a> {
     stop: &'a Stop,
@@ -379,4 +463,61 @@ fn a_stopped_render_keeps_what_it_has() {
         assert_eq!(masked == 0, rows >= 32, "{rows} rows: {masked} pixels without samples");
         assert!(image.radiance.iter().flatten().all(|x| x.is_finite()));
     }
+}
+
+#[test]
+fn a_render_stopped_before_it_began_is_all_mask() {
+    let built = scene(goniofit::render::scene::BUILT_IN[0].toml);
+    let stop = Stop::new();
+    stop.request();
+    let control = Control { stop: &stop, ..Control::silent() };
+    let film = render(&built, &Options { width: 8, height: 8, ..Options::default() }, control).expect("renders");
+    let image = film.to_image();
+    assert_eq!((film.samples(), image.metadata.samples), (0, Some(0)));
+    assert_eq!((image.mask, image.radiance), (Some(vec![1.0; 64]), vec![[0.0; 3]; 64]));
+    assert!(image.standard_error.iter().flatten().flatten().all(|e| *e == f64::INFINITY));
+}
+
+/// A built-in scene at 48 × 48 pixels, the albedo of its ball multiplied by `gain`.
+fn shot(name: &str, gain: f64, samples: u32, seed: u64) -> Image {
+    let mut spec = goniofit::render::scene::builtin(name).expect("built in");
+    let ball = spec.materials.get_mut("ball").expect("a ball");
+    ball.kd = ball.kd.map(|kd| kd.map(|k| gain * k));
+    picture(&Scene::build(&spec, Path::new("."), &Materials::new()).expect("builds"), 48, samples, seed).to_image()
+}
+
+/// In how many of ten pairs of pictures with different seeds the difference is said to be more than noise.
+fn flagged(name: &str, gain: f64, samples: (u32, u32)) -> usize {
+    let differs = |k: u64| {
+        let (a, b) = (shot(name, 1.0, samples.0, 100 + 2 * k), shot(name, gain, samples.1, 101 + 2 * k));
+        compare(&a, &b).expect("same size").significance.expect("enough samples")
+    };
+    let found: Vec<_> = (0..10).map(differs).collect();
+    let (z, mean) = (found.iter().map(|s| s.max_z), found.iter().map(|s| s.mean_z2).sum::<f64>() / 10.0);
+    println!("{name} × {gain}, {samples:?} samples: |z| up to {:.2}, mean z² {mean:.2}", z.fold(0.0, f64::max));
+    assert!(gain != 1.0 || (0.5..1.1).contains(&mean), "{name}: mean z² {mean}");
+    found.iter().filter(|s| s.differs).count()
+}
+
+#[test]
+fn noise_is_not_taken_for_a_difference() {
+    for samples in [(16, 16), (64, 64), (16, 256)] {
+        // Of 20 tests at 1 % more than 2 raise a false alarm with probability 0.001.
+        let alarms: usize = ["cornell", "sphere-on-plane"].map(|name| flagged(name, 1.0, samples)).iter().sum();
+        assert!(alarms <= 2, "{samples:?} samples: {alarms} of 20");
+    }
+}
+
+#[test]
+fn an_albedo_wrong_by_five_percent_is_found_with_64_samples() {
+    for name in ["cornell", "sphere-on-plane"] {
+        let found = flagged(name, 1.05, (64, 64));
+        assert!(found >= 9, "{name}: {found} of 10");
+    }
+}
+
+#[test]
+fn few_samples_are_not_judged() {
+    let c = compare(&shot("cornell", 1.0, 4, 1), &shot("cornell", 1.0, 64, 2)).expect("same size");
+    assert!(c.significance.is_none() && c.note.is_some_and(|note| note.contains("too few samples (4)")));
 }

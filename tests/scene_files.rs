@@ -56,6 +56,19 @@ fn every_broken_scene_says_where_and_why() {
 }
 
 #[test]
+fn a_picture_of_too_many_pixels_is_refused() {
+    let text = BUILT_IN[0].toml;
+    let from = text.find("[film]").expect("a film");
+    let of = |size: &str| {
+        let text = format!("{}[film]\nresolution = {size}\n{}", &text[..from], &text[from + "[film]".len()..]);
+        SceneSpec::parse(&text, "test")
+    };
+    assert!(of("[8192, 8192]").is_ok());
+    let message = of("[16384, 16384]").expect_err("too many").to_string();
+    assert!(message.contains("`film.resolution` is [16384, 16384]") && message.contains("67108864"), "{message}");
+}
+
+#[test]
 fn files_that_are_not_there_or_not_loaded_are_named() {
     let error = SceneSpec::read(Path::new("no/such/scene.toml")).expect_err("missing");
     assert!(matches!(error, RenderError::Io { .. }) && error.to_string().contains("no/such/scene.toml"), "{error}");

@@ -8,7 +8,8 @@ use super::demo::write_bytes;
 use super::error::ChainError;
 use crate::image::sheet::{Scale, Sheet, Tile};
 use crate::image::{
-    Bitmap, ColorMap, Comparison, Image, compare, develop, difference_map, encode_exr, encode_png, exposure_for,
+    Bitmap, ColorMap, Comparison, Image, ImageError, compare, develop, difference_map, difference_range, encode_exr,
+    encode_png, exposure_for,
 };
 
 /// A picture with its name, in file names and above the picture.
@@ -68,12 +69,9 @@ pub fn write_gallery(
         write_bytes(&folder.join(format!("{}.png", shown.file)), &encode_png(&bitmap)?)?;
         Ok(bitmap)
     };
-    let mut range = 0.0f64;
-    let mut comparisons = Vec::new();
-    for shown in others {
-        comparisons.push(compare(&shown.image, &reference.image)?);
-        range = range.max(difference_map(&shown.image, &reference.image, None)?.range);
-    }
+    let comparisons =
+        others.iter().map(|shown| compare(&shown.image, &reference.image)).collect::<Result<Vec<_>, _>>()?;
+    let range = shared_range(&reference.image, others)?;
     let mut pictures = vec![tile(preview(reference)?, &reference.label, String::new())];
     let mut maps = vec![legend(&reference.image)];
     for (shown, comparison) in others.iter().zip(&comparisons) {
@@ -95,6 +93,16 @@ pub fn write_gallery(
     Ok(Gallery { comparisons, exposure })
 }
 
+/// The range that shows every picture's difference: the largest of those that differ, 1 where none does.
+fn shared_range(reference: &Image, others: &[Shown]) -> Result<f64, ImageError> {
+    let mut range = None;
+    for shown in others {
+        let own = difference_range(&shown.image, reference)?;
+        range = range.into_iter().chain(own).reduce(f64::max);
+    }
+    Ok(range.unwrap_or(1.0))
+}
+
 fn tile(picture: Bitmap, label: &str, caption: String) -> Tile {
     Tile { picture, label: label.into(), caption, scale: None }
 }
@@ -112,4 +120,27 @@ fn legend(reference: &Image) -> Tile {
         "standard error of the pixels",
         format!("white is {:.1e} W/(sr m²)", (-exposure).exp2()),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_like_its_reference_does_not_hide_the_differences_of_others() {
+        let picture = |value: f64| Image { width: 1, height: 1, radiance: vec![[value; 3]], ..Image::default() };
+        let shown = |value: f64| Shown {
+            file: String::new(),
+            difference_file: String::new(),
+            label: String::new(),
+            image: picture(value),
+        };
+        for (values, want) in
+            [(vec![0.0, 3e-5], 5e-5), (vec![3e-5, 4e-3, 0.0], 5e-3), (vec![0.0, 0.0], 1.0), (vec![], 1.0)]
+        {
+            let others: Vec<Shown> = values.iter().map(|v| shown(*v)).collect();
+            let range = shared_range(&picture(0.0), &others).expect("same size");
+            assert!((range / want - 1.0).abs() < 1e-12, "{values:?}: {range}");
+        }
+    }
 }

@@ -64,24 +64,14 @@ pub struct DifferenceMap {
     pub range: f64,
 }
 
-/// The signed difference of luminance, picture less reference, from −`range` to `range`. Without a range it is the 99.5th
-/// percentile of the absolute difference, rounded up to 1, 2 or 5 times a power of ten.
+/// The signed difference of luminance, picture less reference, from −`range` to `range`. Without a range it is that of
+/// [`difference_range`], or 1 where the pictures are the same.
 ///
 /// # Errors
 /// [`ImageError::Sizes`] where the sizes differ.
 pub fn difference_map(image: &Image, reference: &Image, range: Option<f64>) -> Result<DifferenceMap, ImageError> {
-    image.check_same_size(reference)?;
-    let differences: Vec<Option<f64>> = (0..image.radiance.len())
-        .map(|i| {
-            let known = !image.is_masked(i) && !reference.is_masked(i);
-            known.then(|| luminance(image.radiance[i]) - luminance(reference.radiance[i]))
-        })
-        .collect();
-    let range = range.unwrap_or_else(|| {
-        let mut sizes: Vec<f64> = differences.iter().flatten().map(|d| d.abs()).filter(|d| d.is_finite()).collect();
-        sizes.sort_by(f64::total_cmp);
-        round_up(sizes.get(sizes.len() * 995 / 1000).copied().unwrap_or(0.0))
-    });
+    let differences = differences(image, reference)?;
+    let range = range.or_else(|| range_of(&differences)).unwrap_or(1.0);
     let color = |d: &Option<f64>| match d {
         None => UNKNOWN,
         Some(d) if d.is_nan() => [255, 0, 255],
@@ -91,16 +81,39 @@ pub fn difference_map(image: &Image, reference: &Image, range: Option<f64>) -> R
     Ok(DifferenceMap { bitmap: Bitmap { width: image.width, height: image.height, pixels }, range })
 }
 
+/// The range that shows the difference of two pictures well, W/(sr·m²): the 99.5th percentile of the absolute difference of
+/// luminance (the largest one where that is 0), rounded up to 1, 2 or 5 times a power of ten. `None` where the pictures are the same.
+///
+/// # Errors
+/// [`ImageError::Sizes`] where the sizes differ.
+pub fn difference_range(image: &Image, reference: &Image) -> Result<Option<f64>, ImageError> {
+    Ok(range_of(&differences(image, reference)?))
+}
+
+fn range_of(differences: &[Option<f64>]) -> Option<f64> {
+    let mut sizes: Vec<f64> = differences.iter().flatten().map(|d| d.abs()).filter(|d| d.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let most = sizes.get(sizes.len() * 995 / 1000).filter(|d| **d > 0.0);
+    most.or(sizes.last()).filter(|d| **d > 0.0).map(|d| round_up(*d))
+}
+
+/// Luminance of the picture less that of the reference, pixel by pixel; `None` where one of them is masked.
+fn differences(image: &Image, reference: &Image) -> Result<Vec<Option<f64>>, ImageError> {
+    image.check_same_size(reference)?;
+    let difference = |i: usize| {
+        let known = !image.is_masked(i) && !reference.is_masked(i);
+        known.then(|| luminance(image.radiance[i]) - luminance(reference.radiance[i]))
+    };
+    Ok((0..image.radiance.len()).map(difference).collect())
+}
+
 /// Luminance of linear sRGB (Rec. ITU-R BT.709).
 fn luminance(p: [f64; 3]) -> f64 {
     0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]
 }
 
-/// The next 1, 2 or 5 times a power of ten; 1 for 0.
+/// The next 1, 2 or 5 times a power of ten, for x > 0.
 fn round_up(x: f64) -> f64 {
-    if x <= 0.0 {
-        return 1.0;
-    }
     let decade = 10f64.powf(x.log10().floor());
     let steps = [1.0, 2.0, 5.0];
     steps.iter().map(|s| s * decade).find(|r| *r >= x * (1.0 - 1e-12)).unwrap_or(10.0 * decade)
@@ -126,8 +139,27 @@ mod tests {
 
     #[test]
     fn ranges_are_round_numbers() {
-        for (x, want) in [(0.0, 1.0), (1.0, 1.0), (1.1e-5, 2e-5), (4.0, 5.0), (7e9, 1e10), (0.002, 0.002)] {
+        for (x, want) in [(1.0, 1.0), (1.1e-5, 2e-5), (4.0, 5.0), (7e9, 1e10), (0.002, 0.002)] {
             assert!((round_up(x) / want - 1.0).abs() < 1e-12, "{x}: {}", round_up(x));
+        }
+    }
+
+    #[test]
+    fn the_range_shows_what_differs() {
+        let picture = |value: &dyn Fn(usize) -> f64| Image {
+            width: 1000,
+            height: 1,
+            radiance: (0..1000).map(|i| [value(i); 3]).collect(),
+            ..Image::default()
+        };
+        let black = picture(&|_| 0.0);
+        let range = |image: &Image| difference_range(image, &black).unwrap();
+        assert_eq!(range(&black), None);
+        assert!((difference_map(&black, &black, None).unwrap().range - 1.0).abs() < 1e-15);
+        // One pixel far off does not set the scale, but the only one that differs does.
+        let spike = |i: usize| if i == 7 { 0.3 } else { 0.0 };
+        for (value, want) in [(&(|i| 3e-5 + spike(i)) as &dyn Fn(usize) -> f64, 5e-5), (&spike, 0.5)] {
+            assert!((range(&picture(value)).unwrap() / want - 1.0).abs() < 1e-12);
         }
     }
 

@@ -1,4 +1,5 @@
-//! OpenEXR files: `R`, `G`, `B` hold the radiance, so any viewer opens it; `stderr.R` … its standard error, `mask` the unknown share.
+//! OpenEXR files: `R`, `G`, `B` hold the radiance, so any viewer opens it; `stderr.R` … its standard error, `mask` the expected
+//! share of the pixel's light that nobody measured, 0 to 1 (1 too where a stopped render left a pixel without samples).
 //!
 //! Values are written as 32-bit floats, compressed without loss; how the picture came about stands in text attributes named
 //! `goniofit.…`.

@@ -10,14 +10,20 @@ mod compare;
 mod error;
 mod exr_file;
 pub mod sheet;
+mod significance;
 mod tone;
 
 pub use bitmap::{Bitmap, encode_png};
-pub use colormap::{ColorMap, DifferenceMap, difference_map};
-pub use compare::{Comparison, Significance, compare};
+pub use colormap::{ColorMap, DifferenceMap, difference_map, difference_range};
+pub use compare::{Comparison, compare};
 pub use error::ImageError;
 pub use exr_file::{encode_exr, read_exr};
+pub use significance::Significance;
 pub use tone::{develop, exposure_for, srgb_encode};
+
+/// A pixel of whose light a larger share is unknown is masked. The share is an expected value, so more samples find it more
+/// exactly, but no more pixels beyond it: a table with a small gap keeps its pixels, however long it is rendered.
+pub const MASKED_SHARE: f64 = 0.02;
 
 /// A picture of linear radiance with its layers. Pixels run along rows, row 0 on top.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,7 +36,8 @@ pub struct Image {
     pub radiance: Vec<[f64; 3]>,
     /// Standard error of the radiance, where it is known; the same shape.
     pub standard_error: Option<Vec<[f64; 3]>>,
-    /// Share of the pixel that is unknown, 0 to 1, where anything can be; one value a pixel.
+    /// Expected share of the pixel's light that nobody measured, 0 to 1, where anything can be; one value a pixel. Above
+    /// [`MASKED_SHARE`] the pixel is masked: it takes part in no comparison.
     pub mask: Option<Vec<f64>>,
     /// How the picture came about.
     pub metadata: Metadata,

@@ -36,7 +36,7 @@ pub struct PhongShading {
 
 impl PhongShading {
     /// The shade for unit vectors `n`, `s`, `b` and the lights `[I_a, I_d, I_s]`. The rule knows no horizon: a light behind the
-    /// surface still has a highlight. `None` when something is not finite or α < 0.
+    /// surface still has a highlight (the tracer leaves such lights out: `render::PhongEquation`). `None` when something is not finite or α < 0.
     #[must_use]
     pub fn value(&self, n: DVec3, s: DVec3, b: DVec3, lights: [f64; 3]) -> Option<f64> {
         let r = 2.0 * n.dot(s) * n - s;

@@ -58,6 +58,18 @@ pub enum RenderError {
         /// Why not, and what would work.
         reason: String,
     },
+    /// The picture does not fit into memory.
+    #[error(
+        "a picture of {width}x{height} pixels takes {gigabytes:.1} GB while it is rendered, which there is not; choose a smaller one"
+    )]
+    Memory {
+        /// Width, pixels.
+        width: u32,
+        /// Height, pixels.
+        height: u32,
+        /// What was asked for, 10⁹ bytes.
+        gigabytes: f64,
+    },
     /// No built-in scene has this name.
     #[error("there is no built-in scene `{name}`; the built-in scenes are {known}")]
     UnknownScene {

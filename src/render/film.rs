@@ -17,10 +17,13 @@ use crate::numeric::random::{Purpose, RngExt, Stream, stream};
 /// Samples of a pixel in one pass at most.
 const PASS: u32 = 32;
 
+/// Pixels of a picture at most: 8192 × 8192, which takes about 12 GB with all its layers.
+pub const MAX_PIXELS: u64 = 1 << 26;
+
 /// What to render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Width, pixels, 1 to 16384.
+    /// Width, pixels, 1 to 16384; width × height at most 2²⁶.
     pub width: u32,
     /// Height, pixels, 1 to 16384.
     pub height: u32,
@@ -58,6 +61,12 @@ impl Options {
                 return Err(RenderError::Field { origin, field, value, constraint: format!("from 1 to {most}") });
             }
         }
+        if u64::from(self.width) * u64::from(self.height) > MAX_PIXELS {
+            let value = format!("{} × {}", self.width, self.height);
+            let constraint = format!("at most {MAX_PIXELS} pixels (8192 × 8192)");
+            let (origin, field) = ("render options".into(), "width × height".into());
+            return Err(RenderError::Field { origin, field, value, constraint });
+        }
         Ok(())
     }
 }
@@ -68,7 +77,7 @@ impl Options {
 struct Pixel {
     rng: Stream,
     samples: u32,
-    unknown: u32,
+    unknown: f64,
     first: DVec3,
     sum: DVec3,
     squares: DVec3,
@@ -77,7 +86,7 @@ struct Pixel {
 impl Pixel {
     fn new(seed: u64, index: u64) -> Self {
         let rng = stream(seed, Purpose::Pixel, index);
-        Self { rng, samples: 0, unknown: 0, first: DVec3::ZERO, sum: DVec3::ZERO, squares: DVec3::ZERO }
+        Self { rng, samples: 0, unknown: 0.0, first: DVec3::ZERO, sum: DVec3::ZERO, squares: DVec3::ZERO }
     }
 
     fn add(&mut self, path: &PathResult) {
@@ -88,7 +97,7 @@ impl Pixel {
         self.sum += d;
         self.squares += d * d;
         self.samples += 1;
-        self.unknown += u32::from(path.unknown);
+        self.unknown += path.unknown;
     }
 
     fn mean(&self) -> DVec3 {
@@ -148,11 +157,14 @@ impl Film {
         self.pixels.iter().map(|p| u64::from(p.samples)).sum()
     }
 
-    /// The picture with its layers. `mask` is the share of a pixel's paths for which the surface seen is unknown towards the light,
-    /// and 1 where there are no samples.
+    /// The picture with its layers. `mask` is the mean over the pixel's paths of the largest weight at which each asked for a value
+    /// that nobody measured: the expected share of the pixel's light that is unknown, whatever the number of samples.
+    ///
+    /// A pixel without samples (of a render that was stopped early) has radiance 0, an infinite standard error and the mask 1,
+    /// so it takes part in no comparison; where there is one, `metadata.samples` is `Some(0)`.
     #[must_use]
     pub fn to_image(&self) -> Image {
-        let share = |p: &Pixel| if p.samples == 0 { 1.0 } else { f64::from(p.unknown) / f64::from(p.samples) };
+        let share = |p: &Pixel| if p.samples == 0 { 1.0 } else { p.unknown / f64::from(p.samples) };
         Image {
             width: self.width as usize,
             height: self.height as usize,
@@ -181,12 +193,14 @@ impl Film {
 /// but the scene, the options and, when stopped, on the number of samples that each pixel got.
 ///
 /// # Errors
-/// [`RenderError::Field`] where an option is out of range.
+/// [`RenderError::Field`] where an option is out of range, [`RenderError::Memory`] where the picture does not fit.
 pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<Film, RenderError> {
     options.validate()?;
     let start = Instant::now();
     let width = options.width as usize;
-    let pixels = u64::from(options.width) * u64::from(options.height);
+    let count = u64::from(options.width) * u64::from(options.height);
+    let mut pixels = reserved(options, count as usize)?;
+    (0..count as usize).into_par_iter().map(|i| Pixel::new(options.seed, i as u64)).collect_into_vec(&mut pixels);
     let mut film = Film {
         width: options.width,
         height: options.height,
@@ -194,7 +208,7 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         not_finite: 0,
         scene: scene.name.clone(),
         seed: options.seed,
-        pixels: (0..pixels).into_par_iter().map(|index| Pixel::new(options.seed, index)).collect(),
+        pixels,
     };
     let camera = Camera::new(&scene.camera, scene.origin, options.width, options.height);
     let tracer = Tracer::new(scene, options.strategy);
@@ -219,6 +233,17 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     Ok(film)
 }
 
+/// Room for `count` pixels: a picture that does not fit into memory is an error, not the end of the program.
+fn reserved(options: &Options, count: usize) -> Result<Vec<Pixel>, RenderError> {
+    let mut pixels = Vec::new();
+    let refused = |_| {
+        let bytes = count as f64 * size_of::<Pixel>() as f64;
+        RenderError::Memory { width: options.width, height: options.height, gigabytes: bytes * 1e-9 }
+    };
+    pixels.try_reserve_exact(count).map_err(refused)?;
+    Ok(pixels)
+}
+
 /// Adds `samples` paths to every pixel of a row; the number of those that were not finite.
 fn render_row(tracer: &Tracer<'_>, camera: &Camera, y: usize, row: &mut [Pixel], samples: u32) -> u64 {
     let mut bad = 0;
@@ -233,4 +258,28 @@ fn render_row(tracer: &Tracer<'_>, camera: &Camera, y: usize, row: &mut [Pixel],
         }
     }
     bad
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_have_at_most_as_many_pixels_as_stated() {
+        let of = |width, height| Options { width, height, ..Options::default() }.validate();
+        for (width, height) in [(8192, 8192), (16384, 4096), (1, 16384)] {
+            assert!(of(width, height).is_ok(), "{width} × {height}");
+        }
+        for (width, height) in [(16384, 16384), (8192, 8193), (16384, 4097)] {
+            let message = of(width, height).expect_err("too large").to_string();
+            let names = message.contains(&format!("`width × height` is {width} × {height}"));
+            assert!(names && message.contains("67108864"), "{message}");
+        }
+    }
+
+    #[test]
+    fn memory_that_is_not_there_is_an_error() {
+        let error = reserved(&Options::default(), usize::MAX / 2).expect_err("more than there is");
+        assert!(matches!(error, RenderError::Memory { width: 512, height: 512, .. }), "{error}");
+    }
 }

@@ -47,9 +47,10 @@ impl Strategy {
 pub struct PathResult {
     /// Radiance, W/(sr·m²).
     pub radiance: DVec3,
-    /// Whether the surface that the camera sees was asked for a value that nobody measured. What is missing of the light that
-    /// arrives by way of other surfaces does not count: it would mark nearly every pixel of a scene.
-    pub unknown: bool,
+    /// Largest weight, 0 to 1, at which the path asked for a value that nobody measured: the largest channel of its throughput
+    /// there, at most 1. So a gap of the surface that the camera sees counts in full, one that is seen by way of a dark surface
+    /// little. A direction towards a light that something hides asks for nothing.
+    pub unknown: f64,
 }
 
 /// Where and how the path scattered last.
@@ -79,8 +80,14 @@ pub struct Tracer<'a> {
 struct Path {
     radiance: DVec3,
     throughput: DVec3,
-    bounces: u32,
-    unknown: bool,
+    unknown: f64,
+}
+
+impl Path {
+    /// Notes that a value is missing where the path is now.
+    fn meet_unknown(&mut self) {
+        self.unknown = self.unknown.max(self.throughput.abs().max_element().clamp(0.0, 1.0));
+    }
 }
 
 impl<'a> Tracer<'a> {
@@ -93,7 +100,7 @@ impl<'a> Tracer<'a> {
 
     /// Follows one path that starts with `ray` at the camera.
     pub fn trace(&self, mut ray: Ray, rng: &mut Stream) -> PathResult {
-        let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, bounces: 0, unknown: false };
+        let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: 0.0 };
         let mut last: Option<Scatter> = None;
         for bounce in 0..=self.scene.max_bounces {
             let Some(surface) = self.scene.geometry.closest(&ray) else {
@@ -147,8 +154,9 @@ impl<'a> Tracer<'a> {
         }
         let drawn = brdf.sample(vertex.wo, [rng.random(), rng.random(), rng.random()])?;
         let (f, known) = eval_rgb(brdf, drawn.wi, vertex.wo);
-        path.unknown |= !known && path.bounces == 0;
-        path.bounces += 1;
+        if !known {
+            path.meet_unknown();
+        }
         path.throughput *= f * (drawn.wi.z / drawn.pdf);
         let direction = vertex.frame.to_world(drawn.wi).normalize();
         let above = vertex.point.normal.dot(direction) > 0.0;
@@ -166,10 +174,8 @@ impl<'a> Tracer<'a> {
             }
             let u = if by_chance { DVec2::new(rng.random(), rng.random()) } else { DVec2::ZERO };
             let Some(arrival) = light.sample(&vertex.point, u) else { continue };
-            let reflected = self.reflected(brdf, vertex, arrival.wi, arrival.pdf, path);
-            if reflected != DVec3::ZERO && !self.scene.geometry.occluded(&arrival.shadow) {
-                path.radiance += path.throughput * reflected * arrival.irradiance;
-            }
+            let reflected = self.reflected(brdf, vertex, arrival.wi, arrival.pdf);
+            self.add_unhidden(reflected, &arrival.shadow, arrival.irradiance, path);
         }
         if let Some(radiance) = self.scene.environment
             && self.strategy != Strategy::MaterialOnly
@@ -177,26 +183,39 @@ impl<'a> Tracer<'a> {
             let local = sampling::cosine_hemisphere(DVec2::new(rng.random(), rng.random()));
             let pdf = sampling::cosine_hemisphere_pdf(local);
             let wi = vertex.frame.to_world(local).normalize();
-            let reflected = self.reflected(brdf, vertex, wi, Some(pdf), path);
-            if reflected != DVec3::ZERO && !self.scene.geometry.occluded(&Ray::new(vertex.point.above(), wi)) {
-                path.radiance += path.throughput * reflected * radiance / pdf;
-            }
+            let reflected = self.reflected(brdf, vertex, wi, Some(pdf));
+            self.add_unhidden(reflected, &Ray::new(vertex.point.above(), wi), radiance / pdf, path);
         }
     }
 
-    /// f·cosθi towards the eye for light from the world direction `wi`, times the weight of having aimed there.
-    fn reflected(&self, brdf: &dyn Brdf, vertex: &Vertex, wi: DVec3, pdf: Option<f64>, path: &mut Path) -> DVec3 {
+    /// Adds what is reflected of the irradiance that arrives along `shadow`, where nothing is in its way.
+    fn add_unhidden(&self, reflected: Option<DVec3>, shadow: &Ray, irradiance: DVec3, path: &mut Path) {
+        let matters = irradiance != DVec3::ZERO && reflected != Some(DVec3::ZERO);
+        if !matters || self.scene.geometry.occluded(shadow) {
+            return;
+        }
+        match reflected {
+            Some(reflected) => path.radiance += path.throughput * reflected * irradiance,
+            None => path.meet_unknown(),
+        }
+    }
+
+    /// f·cosθi towards the eye for light from the world direction `wi`, times the weight of having aimed there; `None` where f
+    /// is unknown.
+    fn reflected(&self, brdf: &dyn Brdf, vertex: &Vertex, wi: DVec3, pdf: Option<f64>) -> Option<DVec3> {
         let local = vertex.frame.to_local(wi);
         if local.z <= 0.0 || vertex.point.normal.dot(wi) <= 0.0 {
-            return DVec3::ZERO;
+            return Some(DVec3::ZERO);
         }
         let (f, known) = eval_rgb(brdf, local, vertex.wo);
-        path.unknown |= !known && path.bounces == 0;
+        if !known {
+            return None;
+        }
         let weight = pdf.map_or(1.0, |pdf| match self.strategy {
             Strategy::Combined => self.strategy.weight(pdf, brdf.pdf(local, vertex.wo), false),
             fixed => fixed.weight(pdf, 0.0, false),
         });
-        f * (local.z * weight)
+        Some(f * (local.z * weight))
     }
 
     /// Radiance of a light that a ray ran into, times the weight of having found it so.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::brdf::Brdf;
-use crate::geometry::mirror;
+use crate::radiometry::PhongShading;
 
 /// The materials that a caller puts in the place of a scene's names.
 pub type Materials = BTreeMap<String, Material>;
@@ -37,7 +37,10 @@ impl std::fmt::Debug for Material {
 ///
 /// It is a rule for shading, not a BRDF: a light's distance, size and power don't enter (no 1/r²; the products r I are the
 /// radiances to show), nothing is normalised, and light does not travel on: a path ends here. A quad light stands at its centre, and
-/// shines on either side of it; a constant environment is the ambient term's business. A light below the horizon is not seen.
+/// shines on either side of it; a constant environment is the ambient term's business.
+///
+/// The rule itself is [`PhongShading`], which knows no horizon. The tracer adds one: a light below the surface's horizon is not
+/// seen, so it adds nothing, no highlight either.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhongEquation {
     /// `r_a I_a`, radiance per channel.
@@ -51,15 +54,16 @@ pub struct PhongEquation {
 }
 
 impl PhongEquation {
-    /// One light's term, for unit vectors `s` and `b` in the local frame.
+    /// One light's term, for unit vectors `s` and `b` in the local frame; 0 for a light that is not above the horizon.
+    /// NaN where a number is not finite or α < 0.
     #[must_use]
     pub fn light_term(&self, s: DVec3, b: DVec3) -> DVec3 {
         if s.z <= 0.0 {
             return DVec3::ZERO;
         }
-        let cos_alpha = mirror(s).dot(b);
-        let highlight = if cos_alpha > 0.0 { cos_alpha.powf(self.alpha) } else { 0.0 };
-        self.diffuse * s.z + self.specular * highlight
+        let rule = PhongShading { ambient: 0.0, diffuse: 1.0, specular: 1.0, exponent: self.alpha };
+        let term = |c: usize| rule.value(DVec3::Z, s, b, [0.0, self.diffuse[c], self.specular[c]]).unwrap_or(f64::NAN);
+        DVec3::new(term(0), term(1), term(2))
     }
 }
 
@@ -72,4 +76,42 @@ pub fn eval_rgb(brdf: &dyn Brdf, wi: DVec3, wo: DVec3) -> (DVec3, bool) {
     }
     let known = brdf.eval(wi, wo, &mut rgb);
     (DVec3::from(rgb), known)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::direction;
+
+    #[test]
+    fn phong_s_equation_is_the_rule_above_the_horizon_and_nothing_below() {
+        let equation = PhongEquation {
+            ambient: DVec3::ONE,
+            diffuse: DVec3::new(0.5, 0.4, 0.0),
+            specular: DVec3::new(0.7, 0.0, 0.2),
+            alpha: 3.0,
+        };
+        let rule = |c: usize| PhongShading {
+            ambient: 0.0,
+            diffuse: equation.diffuse[c],
+            specular: equation.specular[c],
+            exponent: 3.0,
+        };
+        for theta in [0.0, 0.4, 1.5, 1.6, 2.5] {
+            for (theta_b, phi_b) in [(0.0, 0.0), (0.5, 3.0), (1.2, 0.3), (1.5, 3.2)] {
+                let (s, b) = (direction(theta, 0.1), direction(theta_b, phi_b));
+                let got = equation.light_term(s, b);
+                for c in 0..3 {
+                    let bare = rule(c).value(DVec3::Z, s, b, [1.0; 3]).expect("finite");
+                    let want = if s.z > 0.0 { bare } else { 0.0 };
+                    assert!((got[c] - want).abs() < 1e-15, "theta {theta}, channel {c}: {} vs {want}", got[c]);
+                }
+            }
+        }
+        // Behind the surface the bare rule still has a highlight.
+        let (s, b) = (direction(1.7, 0.1), direction(1.4, 3.2));
+        assert!(rule(0).value(DVec3::Z, s, b, [1.0; 3]).expect("finite") > 0.1);
+        assert_eq!(equation.light_term(s, b), DVec3::ZERO);
+        assert!(PhongEquation { alpha: -1.0, ..equation }.light_term(DVec3::Z, DVec3::Z).is_nan());
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! In: a scene (a [`SceneSpec`] read from TOML plus the materials that its names stand for), a resolution, a number of samples
 //! and a seed. Out: a [`Film`] of radiance in W/(sr·m²) per linear RGB channel, with the standard error of every pixel and
-//! the share of its paths that met a direction where a measured table is empty. Lengths are in scene units, called metres.
+//! the share of its light that nobody measured. Lengths are in scene units, called metres.
 //!
 //! The one decision to know: everything is one-sided. A surface reflects, and a light shines, on the side that its normal points
 //! to; the other side is black and blocks light. A path is a chain of at most `max_bounces` scattering events; at each one

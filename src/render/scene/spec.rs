@@ -75,7 +75,7 @@ impl CameraSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FilmSpec {
-    /// Width and height, pixels, 1 to 16384 each.
+    /// Width and height, pixels, 1 to 16384 each and at most 2²⁶ pixels in all.
     pub resolution: [u32; 2],
     /// Samples per pixel, 1 to 2²⁴.
     pub samples: u32,

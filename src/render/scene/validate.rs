@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::super::RenderError;
+use super::super::film::MAX_PIXELS;
 use super::spec::{MaterialSpec, SceneSpec};
 
 /// Names the place of one value for the checks below.
@@ -79,6 +80,8 @@ impl SceneSpec {
         let size = self.film.resolution;
         let fits = size.iter().all(|n| (1..=16384).contains(n));
         check.holds(fits, "film.resolution", size, "two numbers of pixels from 1 to 16384")?;
+        let fits = size.iter().map(|n| u64::from(*n)).product::<u64>() <= MAX_PIXELS;
+        check.holds(fits, "film.resolution", size, &format!("at most {MAX_PIXELS} pixels in all (8192 × 8192)"))?;
         let samples = self.film.samples;
         check.holds((1..=1 << 24).contains(&samples), "film.samples", samples, "from 1 to 16777216")
     }
