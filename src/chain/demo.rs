@@ -122,7 +122,7 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
         format!("{} direction pairs with shot and read noise; {SCENE} scene, {}² pixels", table.len(), options.size);
     let mut comparisons = Vec::new();
     if let Some((reference, others)) = shown.split_first() {
-        comparisons = write_gallery(folder, &title, &subtitle, reference, others)?.comparisons;
+        comparisons = write_gallery(folder, &title, &subtitle, reference, others, None)?.comparisons;
         lap("compare and write");
     }
     let mut images = comparisons.into_iter().map(Some).chain(std::iter::repeat_with(|| None));

@@ -51,7 +51,7 @@ pub fn difference(image: &Image, reference: &Image) -> Image {
 }
 
 /// Writes `reference` and every other picture as EXR and PNG, the differences likewise, and a contact sheet of all
-/// (`sheet.png`). All previews share one exposure, all difference maps one scale.
+/// (`sheet.png`). All previews share one exposure (stops; by the reference where none is given), all difference maps one scale.
 ///
 /// # Errors
 /// [`ChainError`] where sizes differ or the disk refuses.
@@ -61,8 +61,9 @@ pub fn write_gallery(
     subtitle: &str,
     reference: &Shown,
     others: &[Shown],
+    exposure: Option<f64>,
 ) -> Result<Gallery, ChainError> {
-    let exposure = exposure_for(&reference.image);
+    let exposure = exposure.unwrap_or_else(|| exposure_for(&reference.image));
     let preview = |shown: &Shown| -> Result<Bitmap, ChainError> {
         write_bytes(&folder.join(format!("{}.exr", shown.file)), &encode_exr(&shown.image)?)?;
         let bitmap = develop(&shown.image, exposure);
@@ -103,8 +104,10 @@ fn shared_range(reference: &Image, others: &[Shown]) -> Result<f64, ImageError> 
     Ok(range.unwrap_or(1.0))
 }
 
+/// Small pictures are enlarged by a whole factor, so that labels have room.
 fn tile(picture: Bitmap, label: &str, caption: String) -> Tile {
-    Tile { picture, label: label.into(), caption, scale: None }
+    let factor = 320usize.div_ceil(picture.width.max(1));
+    Tile { picture: picture.enlarged(factor), label: label.into(), caption, scale: None }
 }
 
 /// The reference's own noise, so that differences can be judged against it.

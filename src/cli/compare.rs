@@ -1,18 +1,19 @@
 //! `goniofit compare`: in which numbers two pictures differ.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use super::failure::Failure;
 use super::ui::Ui;
-use crate::image::{Comparison, compare, read_exr};
+use crate::image::{Comparison, Image, compare, decode_exr, read_exr};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  goniofit compare fit-1.exr table.exr --fail-above rel_mse=1e-3")]
 pub(super) struct Args {
-    /// The picture (EXR)
+    /// The picture (EXR); `-` is stdin
     image: PathBuf,
-    /// What it should look like (EXR)
+    /// What it should look like (EXR); `-` is stdin
     reference: PathBuf,
     /// Exit with 1 where the metric (rmse, rel_mse, max_abs, max_z) is above X
     #[arg(long, value_name = "METRIC=X", value_parser = parse_limit)]
@@ -31,7 +32,10 @@ fn parse_limit(text: &str) -> Result<(String, f64), String> {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
-    let comparison = compare(&read_exr(&args.image)?, &read_exr(&args.reference)?)?;
+    if args.image.as_os_str() == "-" && args.reference.as_os_str() == "-" {
+        return Err(Failure::usage("only one of the pictures can come from stdin"));
+    }
+    let comparison = compare(&picture(&args.image)?, &picture(&args.reference)?)?;
     let object = serde_json::to_value(&comparison).map_err(|e| Failure::work(e.to_string()))?;
     let text = describe(&comparison);
     for (name, limit) in &args.fail_above {
@@ -45,6 +49,16 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     ui.result(&text, &object);
     Ok(())
+}
+
+/// The picture in a file, `-` being stdin.
+fn picture(path: &Path) -> Result<Image, Failure> {
+    if path != Path::new("-") {
+        return Ok(read_exr(path)?);
+    }
+    let mut bytes = Vec::new();
+    std::io::stdin().read_to_end(&mut bytes).map_err(|e| Failure::usage(format!("stdin: {e}")))?;
+    Ok(decode_exr(Path::new("stdin"), bytes)?)
 }
 
 fn metric(c: &Comparison, name: &str) -> Option<f64> {
@@ -70,14 +84,25 @@ fn describe(c: &Comparison) -> String {
     }
     match &c.significance {
         Some(s) => {
+            let (x, y, c) = s.at;
+            let where_ = match s.block {
+                1 => format!("pixel ({x}, {y}), channel {c}"),
+                n => format!("the {n}×{n} pixels from ({x}, {y}) on, channel {c}"),
+            };
             let verdict = if s.differs { "differ by more than their noise" } else { "agree within their noise" };
             let _ = writeln!(
                 t,
-                "the pictures {verdict}: largest |z| {:.2} at {:?}, p {:.2e}, mean z² {:.3}",
-                s.max_z, s.at, s.p, s.mean_z2
+                "the pictures {verdict}: largest |z| {:.2} in {where_}, p {:.2e}, mean z² {:.3}",
+                s.max_z, s.p, s.mean_z2
             );
         }
-        None => t.push_str("no standard errors are stored: whether the difference is noise can't be said\n"),
+        None => t.push_str(
+            "whether the difference is noise can't be said
+",
+        ),
+    }
+    if let Some(note) = &c.note {
+        let _ = writeln!(t, "note: {note}");
     }
     t
 }

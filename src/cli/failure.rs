@@ -47,6 +47,9 @@ impl From<MeasurementError> for Failure {
 
 impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
+        if matches!(error, RenderError::Memory { .. }) {
+            return Self::work(error.to_string());
+        }
         Self::usage(error.to_string())
     }
 }
@@ -68,6 +71,7 @@ impl From<ChainError> for Failure {
     fn from(error: ChainError) -> Self {
         match error {
             ChainError::Fit(error) => error.into(),
+            ChainError::Render(error) => error.into(),
             ChainError::Write { .. } => Self::work(error.to_string()),
             other => Self::usage(other.to_string()),
         }

@@ -164,9 +164,10 @@ fn check_extension(path: &Path, wanted: &str, option: &str) -> Result<(), Failur
     Err(Failure::usage(format!("{option}: expected a name that ends in .{wanted}, found {}", path.display())))
 }
 
+/// Share of the pixels that are masked.
 fn unknown_share(image: &Image) -> f64 {
-    let Some(mask) = &image.mask else { return 0.0 };
-    mask.iter().filter(|m| **m > 0.0).count() as f64 / mask.len().max(1) as f64
+    let pixels = image.radiance.len();
+    (0..pixels).filter(|i| image.is_masked(*i)).count() as f64 / pixels.max(1) as f64
 }
 
 fn mean(image: &Image) -> [f64; 3] {

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::failure::Failure;
 use super::info::Reading;
 use super::output::write_text;
-use super::render::PictureArgs;
+use super::render::{PictureArgs, parse_exposure};
 use super::ui::{self, Ui};
 use crate::brdf::Material;
 use crate::chain::{self, Shown, Source, Stage};
@@ -25,6 +25,9 @@ pub(super) struct Args {
     fits: Vec<String>,
     #[command(flatten)]
     picture: PictureArgs,
+    /// Exposure of the previews, stops (default: by the table's picture, lamps left aside)
+    #[arg(long, allow_negative_numbers = true, value_parser = parse_exposure)]
+    exposure: Option<f64>,
     /// Folder to write to: table.exr, fit-1.exr, difference-1.exr …, previews, sheet.png, numbers.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -67,7 +70,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     let subtitle =
         format!("{} scene, {} samples a pixel", stage.spec.name, reference.image.metadata.samples.unwrap_or(0));
-    let gallery = chain::write_gallery(&args.out, &name, &subtitle, reference, others)?;
+    let gallery = chain::write_gallery(&args.out, &name, &subtitle, reference, others, args.exposure)?;
     let rows: Vec<_> = (fits.iter().zip(&gallery.comparisons).enumerate())
         .map(|(k, ((file, m), c))| json!({ "fit": file, "model": m.model(), "picture": format!("fit-{}.exr", k + 1), "image": c }))
         .collect();
@@ -84,6 +87,9 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     for ((file, m), c) in fits.iter().zip(&gallery.comparisons) {
         let differs = c.significance.as_ref().map_or("–", |s| if s.differs { "yes" } else { "no" });
+        if let Some(note) = &c.note {
+            ui.warn(note);
+        }
         let psnr = c.psnr.map_or("–".into(), |p| format!("{p:.1}"));
         let label = format!("{file} ({})", m.model());
         let _ =

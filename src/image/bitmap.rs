@@ -20,6 +20,17 @@ impl Bitmap {
         Self { width, height, pixels: vec![color; width * height] }
     }
 
+    /// Every pixel as a square of `factor`² pixels; as it is for 0 or 1.
+    #[must_use]
+    pub fn enlarged(self, factor: usize) -> Self {
+        if factor < 2 {
+            return self;
+        }
+        let (width, height) = (self.width * factor, self.height * factor);
+        let pixel = |i: usize| self.pixels[i / width / factor * self.width + i % width / factor];
+        Self { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+
     /// The pixel in column x and row y, if it is inside.
     pub fn pixel_mut(&mut self, x: usize, y: usize) -> Option<&mut [u8; 3]> {
         (x < self.width).then(|| self.pixels.get_mut(y * self.width + x))?
@@ -79,6 +90,15 @@ mod tests {
         canvas.fill(0, 0, 1, 100, [7; 3]);
         let painted = |color| canvas.pixels.iter().filter(|p| **p == color).count();
         assert_eq!((painted([9; 3]), painted([7; 3]), painted([0; 3])), (4, 3, 5));
+    }
+
+    #[test]
+    fn enlarging_repeats_pixels() {
+        let mut small = Bitmap::filled(2, 1, [1; 3]);
+        *small.pixel_mut(1, 0).unwrap() = [9; 3];
+        let large = small.enlarged(2);
+        assert_eq!((large.width, large.height), (4, 2));
+        assert_eq!(large.pixels, [[1; 3], [1; 3], [9; 3], [9; 3], [1; 3], [1; 3], [9; 3], [9; 3]]);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::significance::{Significance, significance};
 use super::{Image, ImageError, MASKED_SHARE};
+use crate::numeric::float::larger;
 
 /// Added to the squared reference in [`Comparison::rel_mse`], so that dark pixels do not dominate, (W/(sr·m²))².
 const REL_MSE_FLOOR: f64 = 1e-2;
@@ -33,7 +34,7 @@ pub struct Comparison {
     pub not_finite: usize,
     /// Whether the differences exceed the noise; `None` where that can't be said.
     pub significance: Option<Significance>,
-    /// Why there is no `significance`.
+    /// Why there is no `significance`, or why not to trust it.
     pub note: Option<String>,
 }
 
@@ -65,7 +66,7 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, ImageErro
     let mean_of_all = |sum: f64| sum / (3 * pixels) as f64;
     let rmse = mean_of_all(squares).sqrt();
     let (significance, note) = match significance(image, reference, &known) {
-        Ok(found) => (Some(found), None),
+        Ok(found) => (Some(found), same_noise(image, reference)),
         Err(why) => (None, Some(why)),
     };
     Ok(Comparison {
@@ -83,9 +84,15 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, ImageErro
     })
 }
 
-/// The larger of two values; NaN wins.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a >= b { a } else { b }
+/// Pictures from one seed share their noise, which the test takes for independent.
+fn same_noise(image: &Image, reference: &Image) -> Option<String> {
+    let seed = image.metadata.seed.filter(|_| image.standard_error.is_some() && reference.standard_error.is_some())?;
+    let shared = reference.metadata.seed == Some(seed) && image.metadata.scene == reference.metadata.scene;
+    shared.then(|| {
+        format!(
+            "both pictures were rendered with seed {seed}: their noise is not independent, as the test takes it to be"
+        )
+    })
 }
 
 impl Image {

@@ -21,9 +21,9 @@ type Attributes = std::collections::HashMap<ex::Text, ex::AttributeValue>;
 pub fn encode_exr(image: &Image) -> Result<Vec<u8>, ImageError> {
     let channels = channels(image)?;
     let mut attributes = ex::LayerAttributes::default();
-    for (key, value) in texts(&image.metadata) {
-        attributes.other.insert(key.into(), ex::AttributeValue::Text(value.as_str().into()));
-    }
+    // A single attribute: several would stand in the file in an order that changes from run to run.
+    let text = serde_json::to_string(&image.metadata).map_err(|e| refused_text(&e))?;
+    attributes.other.insert(ATTRIBUTE.into(), ex::AttributeValue::Text(text.as_str().into()));
     attributes.software_name = image.metadata.program.as_deref().map(ex::Text::from);
     let encoding = ex::Encoding { compression: ex::Compression::ZIP16, ..ex::Encoding::default() };
     let layer = ex::Layer::new(
@@ -43,7 +43,14 @@ pub fn encode_exr(image: &Image) -> Result<Vec<u8>, ImageError> {
 /// # Errors
 /// [`ImageError`] naming the file and what was expected.
 pub fn read_exr(path: &Path) -> Result<Image, ImageError> {
-    let bytes = std::fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })?;
+    decode_exr(path, std::fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })?)
+}
+
+/// [`read_exr`] from bytes; messages call them `path`.
+///
+/// # Errors
+/// As [`read_exr`].
+pub fn decode_exr(path: &Path, bytes: Vec<u8>) -> Result<Image, ImageError> {
     let invalid =
         |e: &exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
     let read = ex::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
@@ -93,30 +100,17 @@ fn channels(image: &Image) -> Result<Vec<Channel>, ImageError> {
     Ok(channels)
 }
 
-fn texts(metadata: &Metadata) -> Vec<(&'static str, String)> {
-    [
-        ("goniofit.scene", metadata.scene.clone()),
-        ("goniofit.seed", metadata.seed.map(|v| v.to_string())),
-        ("goniofit.samples", metadata.samples.map(|v| v.to_string())),
-        ("goniofit.seconds", metadata.seconds.map(|v| v.to_string())),
-        ("goniofit.program", metadata.program.clone()),
-    ]
-    .into_iter()
-    .filter_map(|(key, value)| Some((key, value?)))
-    .collect()
+/// Name of the attribute that tells how the picture came about, as a JSON object.
+const ATTRIBUTE: &str = "goniofit";
+
+fn refused_text(e: &serde_json::Error) -> ImageError {
+    ImageError::Encode { format: "OpenEXR", reason: e.to_string() }
 }
 
 fn metadata(attributes: &Attributes) -> Metadata {
-    let text = |key: &str| match attributes.get(&ex::Text::from(key)) {
-        Some(ex::AttributeValue::Text(value)) => Some(value.to_string()),
-        _ => None,
-    };
-    Metadata {
-        scene: text("goniofit.scene"),
-        seed: text("goniofit.seed").and_then(|v| v.parse().ok()),
-        samples: text("goniofit.samples").and_then(|v| v.parse().ok()),
-        seconds: text("goniofit.seconds").and_then(|v| v.parse().ok()),
-        program: text("goniofit.program"),
+    match attributes.get(&ex::Text::from(ATTRIBUTE)) {
+        Some(ex::AttributeValue::Text(text)) => serde_json::from_str(&text.to_string()).unwrap_or_default(),
+        _ => Metadata::default(),
     }
 }
 

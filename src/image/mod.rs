@@ -17,7 +17,7 @@ pub use bitmap::{Bitmap, encode_png};
 pub use colormap::{ColorMap, DifferenceMap, difference_map, difference_range};
 pub use compare::{Comparison, compare};
 pub use error::ImageError;
-pub use exr_file::{encode_exr, read_exr};
+pub use exr_file::{decode_exr, encode_exr, read_exr};
 pub use significance::Significance;
 pub use tone::{develop, exposure_for, srgb_encode};
 
@@ -44,7 +44,8 @@ pub struct Image {
 }
 
 /// How a picture came about, as far as is known.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Metadata {
     /// Name of the scene.
     pub scene: Option<String>,

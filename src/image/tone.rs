@@ -19,14 +19,16 @@ pub fn develop(image: &Image, exposure: f64) -> Bitmap {
     Bitmap { width: image.width, height: image.height, pixels: image.radiance.iter().map(pixel).collect() }
 }
 
-/// The exposure (stops) at which the brightest channel of 99 % of the pixels that are not black is not clipped; 0 for a black
-/// picture.
+/// The exposure (stops) at which the brightest channel of 99 % of the pixels is not clipped, lamps and mirror images of them (more than
+/// 8 times the median of what is lit) left aside; 0 for a black picture.
 #[must_use]
 pub fn exposure_for(image: &Image) -> f64 {
     let brightest = |p: &[f64; 3]| p.iter().copied().fold(0.0, f64::max);
     let mut bright: Vec<f64> = image.radiance.iter().map(brightest).filter(|x| *x > 0.0 && x.is_finite()).collect();
     bright.sort_by(f64::total_cmp);
-    bright.get(bright.len() * 99 / 100).map_or(0.0, |white| -white.log2())
+    let lamp = bright.get(bright.len() / 2).map_or(0.0, |median| 8.0 * median);
+    let lit = &bright[..bright.partition_point(|x| *x <= lamp)];
+    lit.get(lit.len() * 99 / 100).map_or(0.0, |white| -white.log2())
 }
 
 #[cfg(test)]
