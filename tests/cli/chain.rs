@@ -9,7 +9,11 @@ fn assert_no_null(value: &Value, path: &str) {
     match value {
         Value::Null => panic!("{path} is null"),
         Value::Array(list) => list.iter().enumerate().for_each(|(i, v)| assert_no_null(v, &format!("{path}[{i}]"))),
-        Value::Object(map) => map.iter().for_each(|(k, v)| assert_no_null(v, &format!("{path}.{k}"))),
+        // A note is there only where there is something to note.
+        Value::Object(map) => {
+            let said = map.iter().filter(|(k, _)| *k != "note");
+            said.for_each(|(k, v)| assert_no_null(v, &format!("{path}.{k}")));
+        }
         _ => {}
     }
 }
@@ -17,7 +21,7 @@ fn assert_no_null(value: &Value, path: &str) {
 #[test]
 fn the_demo_writes_every_file_and_its_numbers_can_be_read() {
     let b = Bench::new();
-    let said = b.json(&["demo", "--size", "24", "--samples", "4", "--out", "d"]);
+    let said = b.json(&["demo", "--size", "24", "--samples", "16", "--out", "d"]);
     let mut expected = vec!["measurement.csv", "numbers.json", "sheet.png", "lambert.json", "lambert+phong.json"];
     let pictures = ["truth", "lambert", "lambert+phong", "difference-lambert", "difference-lambert+phong"];
     let files: Vec<String> = pictures.iter().flat_map(|p| [format!("{p}.exr"), format!("{p}.png")]).collect();
