@@ -81,7 +81,10 @@ pub fn write_gallery(
         write_bytes(&folder.join(format!("{name}.exr")), &encode_exr(&difference(&shown.image, &reference.image))?)?;
         let map = difference_map(&shown.image, &reference.image, Some(range))?;
         write_bytes(&folder.join(format!("{name}.png")), &encode_png(&map.bitmap)?)?;
-        let caption = format!("rmse {:.2e}   relMSE {:.2e}", comparison.rmse, comparison.rel_mse);
+        let mut caption = format!("rmse {:.2e}   relMSE {:.2e}", comparison.rmse, comparison.rel_mse);
+        if comparison.masked > 0 {
+            caption += "   grey: not measured, left out";
+        }
         let unit = "W/(sr m²)".to_owned();
         let scale = Scale { map: ColorMap::Diverging, low: -map.range, high: map.range, unit };
         let label = format!("{} less {}", shown.label, reference.label);
