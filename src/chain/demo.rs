@@ -3,16 +3,17 @@
 use std::path::Path;
 use std::time::Instant;
 
-use serde::Serialize;
+use serde_json::json;
 
 use super::error::ChainError;
 use super::gallery::{Shown, write_gallery};
 use super::library::BuiltInMaterial;
 use super::measure::measure;
+use super::output::write_bytes;
 use super::pictures::{Stage, picture};
 use super::source::{Source, render_material};
 use crate::brdf::Material;
-use crate::control::{Control, write_whole};
+use crate::control::Control;
 use crate::fit::{FitOptions, fit};
 use crate::gonio::{Instrument, Scan};
 use crate::image::Comparison;
@@ -144,36 +145,20 @@ fn write_material(path: &Path, material: &Material) -> Result<(), ChainError> {
     write_bytes(path, (text + "\n").as_bytes())
 }
 
-/// Writes a file whole.
-pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ChainError> {
-    write_whole::<_, std::io::Error>(path, |w| w.write_all(bytes)).map_err(|e| ChainError::write(path, e))
-}
-
-#[derive(Serialize)]
-struct Numbers<'a> {
-    material: &'a str,
-    pairs: usize,
-    truth: serde_json::Value,
-    fits: Vec<serde_json::Value>,
-    seconds: &'a [(String, f64)],
-    stopped: bool,
-}
-
 impl Demo {
     /// All numbers as one JSON value.
     #[must_use]
     pub fn numbers(&self) -> serde_json::Value {
-        let file = |m: &Material| m.to_json().ok().and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
-        let fits = self.fits.iter().map(|f| serde_json::json!({ "material": file(&f.material), "image": f.image }));
-        let numbers = Numbers {
-            material: self.name,
-            pairs: self.pairs,
-            truth: file(&self.truth),
-            fits: fits.collect(),
-            seconds: &self.times,
-            stopped: self.stopped,
-        };
-        serde_json::to_value(numbers).unwrap_or_default()
+        let file = |m: &Material| m.to_json().ok().and_then(|t| serde_json::from_str::<serde_json::Value>(&t).ok());
+        let fit = |f: &DemoFit| json!({ "material": file(&f.material), "image": f.image });
+        json!({
+            "material": self.name,
+            "pairs": self.pairs,
+            "truth": file(&self.truth),
+            "fits": self.fits.iter().map(fit).collect::<Vec<_>>(),
+            "seconds": self.times,
+            "stopped": self.stopped,
+        })
     }
 }
 

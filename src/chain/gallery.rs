@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::demo::write_bytes;
 use super::error::ChainError;
+use super::output::write_bytes;
 use crate::image::sheet::{Scale, Sheet, Tile};
 use crate::image::{
     Bitmap, ColorMap, Comparison, Image, ImageError, compare, develop, difference_map, difference_range, encode_exr,

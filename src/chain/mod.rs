@@ -10,6 +10,7 @@ mod error;
 mod gallery;
 mod library;
 mod measure;
+mod output;
 mod pictures;
 mod scatter;
 mod source;

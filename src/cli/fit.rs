@@ -72,6 +72,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         }
         match one(args, file, target.as_deref(), ui) {
             Ok((said, object)) => {
+                ui.has_something_to_keep();
                 text.push_str(&said);
                 results.push(object);
             }

@@ -59,8 +59,14 @@ impl Ui {
 
     /// Progress on a terminal, and the wish to stop.
     pub fn control(&self) -> Control<'_> {
-        WORKING.store(true, Ordering::Relaxed);
+        self.has_something_to_keep();
         Control { progress: &self.bar, stop: &STOP }
+    }
+
+    /// From here on Ctrl-C asks to stop instead of ending the process: there is something to finish.
+    #[allow(clippy::unused_self)] // the flag is the process's, for a signal handler sees nothing else
+    pub fn has_something_to_keep(&self) {
+        WORKING.store(true, Ordering::Relaxed);
     }
 
     /// A remark on stderr, unless quiet.

@@ -73,6 +73,11 @@ impl Moments {
     pub fn gram(&self, channel: usize) -> &DMatrix<f64> {
         if self.gram.len() == 1 { &self.gram[0] } else { &self.gram[channel] }
     }
+
+    fn symmetric(mut self) -> Self {
+        self.gram.iter_mut().for_each(DMatrix::fill_upper_triangle_with_lower_triangle);
+        self
+    }
 }
 
 /// One pass for [`Moments`]; with `slopes` also of the derivative columns.
@@ -111,13 +116,6 @@ pub(super) fn moments(samples: &Samples, lobes: &[ShapedLobe], slopes: bool) -> 
         },
     )
     .symmetric()
-}
-
-impl Moments {
-    fn symmetric(mut self) -> Self {
-        self.gram.iter_mut().for_each(DMatrix::fill_upper_triangle_with_lower_triangle);
-        self
-    }
 }
 
 /// w g² · column over a block.

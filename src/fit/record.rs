@@ -39,10 +39,8 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
         rmse: (facts.solution.cost / samples.residuals().max(1) as f64).sqrt() * samples.scale,
         iterations: facts.outcome.history.len().saturating_sub(1) as u64,
         seconds: facts.seconds,
-        undetermined: undetermined(&rows, &facts.measurement.channels),
         ..FitRecord::default()
     };
-    record.warnings = facts.warnings(&record);
     let mut lobes = Vec::new();
     for row in rows {
         lobes.push(row.term);
@@ -50,6 +48,8 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
         record.interval_95.push(row.interval);
     }
     let mut material = Material { channels: facts.measurement.channels.clone(), lobes, fit: None };
+    record.undetermined = undetermined(&material, &record.standard_error);
+    record.warnings = facts.warnings(&record);
     record.warnings.extend(energy_warning(&material));
     material.fit = Some(record);
     material
@@ -153,15 +153,13 @@ fn sort_lobes_of_one_kind(rows: &mut [Row]) {
 }
 
 /// Names of the parameters without a standard error: `phong.exponent`, `lambert.weight[g]`, `phong[1].exponent`.
-fn undetermined(rows: &[Row], channels: &[String]) -> Vec<String> {
+fn undetermined(material: &Material, errors: &[LobeRecord<Option<f64>>]) -> Vec<String> {
     let mut names = Vec::new();
-    for (l, row) in rows.iter().enumerate() {
-        let before = rows[..l].iter().filter(|r| r.term.kind == row.term.kind).count();
-        let lobe =
-            if before == 0 { row.term.kind.name().to_owned() } else { format!("{}[{before}]", row.term.kind.name()) };
-        let open = row.error.weight.iter().zip(channels).filter(|(e, _)| e.is_none());
+    for (l, error) in errors.iter().enumerate() {
+        let lobe = material.lobe_name(l);
+        let open = error.weight.iter().zip(&material.channels).filter(|(e, _)| e.is_none());
         names.extend(open.map(|(_, c)| format!("{lobe}.weight[{c}]")));
-        let open = row.error.shape.iter().filter(|(_, e)| *e == PerChannel::Shared(None));
+        let open = error.shape.iter().filter(|(_, e)| *e == PerChannel::Shared(None));
         names.extend(open.map(|(name, _)| format!("{lobe}.{name}")));
     }
     names

@@ -21,12 +21,6 @@ pub fn diff_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     (ab - cd) + (ab_low - cd_low)
 }
 
-/// a·b + c·d, compensated like [`diff_of_products`].
-#[must_use]
-pub fn sum_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
-    diff_of_products(a, b, -c, d)
-}
-
 /// Dot product of two 3-vectors as if computed in twice the precision and rounded once (Ogita, Rump, Oishi 2005, Dot2).
 #[must_use]
 pub fn dot_compensated(a: glam::DVec3, b: glam::DVec3) -> f64 {
