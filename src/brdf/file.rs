@@ -36,13 +36,25 @@ pub struct FitRecord {
     pub status: String,
     /// The loss minimised.
     pub loss: String,
-    /// `solid-angle` or `uniform`.
+    /// `solid-angle`, `uniform` or `sigma`.
     pub weights: String,
+    /// The robust loss with its SCALE, if any: `cauchy:2.385`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robust: Option<String>,
+    /// The robust loss's s, in the residual's unit: one, or one a channel where channels were fitted apart.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub robust_scale: Vec<f64>,
+    /// ε of the relative loss, channel by channel, in the data's unit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub relative_epsilon: Vec<f64>,
+    /// The ranges that parameters were held to, as they were asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<String>,
     /// Directions with a positive weight in at least one channel.
     pub samples: u64,
-    /// Σ w r².
+    /// Σ w r² (robust: Σ w s² ρ).
     pub cost: f64,
-    /// √(Σ w r² / Σ w) over samples and channels.
+    /// √(cost / Σ w) over samples and channels.
     pub rmse: f64,
     /// Steps of the nonlinear search.
     pub iterations: u64,
@@ -56,6 +68,104 @@ pub struct FitRecord {
     pub undetermined: Vec<String>,
     /// What the user must know.
     pub warnings: Vec<String>,
+    /// Correlations of the parameters; left out for more than 40 of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlation: Option<Correlation>,
+    /// What the residuals are made of; none where that can't be told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual: Option<ResidualRecord>,
+    /// How far the model's own error moves the parameters: standard errors that take the residuals of neighbours as one error.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub model_error: Vec<LobeRecord<Option<f64>>>,
+    /// How much of the light the fit reflects; none in the flat world.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<EnergyRecord>,
+    /// How the global minimum was looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub search: Option<SearchRecord>,
+    /// The part of the samples that a budget or target allowed, where that was not all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subset: Option<SubsetRecord>,
+    /// Standard errors from redrawn data, where they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bootstrap: Option<BootstrapRecord>,
+}
+
+/// Correlations between the errors of parameters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Correlation {
+    /// Their names, in the order of rows and columns.
+    pub parameters: Vec<String>,
+    /// Rows; `null` where a parameter is undetermined or exact.
+    pub matrix: Vec<Vec<Option<f64>>>,
+}
+
+/// What the residuals are made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResidualRecord {
+    /// The rmse that noise explains, in the loss's unit.
+    pub noise_rmse: f64,
+    /// The rmse of the model's own error: √(rmse² − noise²).
+    pub model_rmse: f64,
+    /// Share of the residuals' variance that is structured, not noise.
+    pub structured_share: f64,
+    /// Where the noise is known from: `sigma` (the measurement's own) or `neighbours` (how alike residuals of neighbours are).
+    pub noise_from: String,
+    /// How many independent samples the residuals are worth.
+    pub effective_samples: f64,
+}
+
+/// How much of the light a fit reflects.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EnergyRecord {
+    /// Polar angles of incidence, degrees.
+    pub theta_deg: Vec<f64>,
+    /// Directional albedo there, channel by channel.
+    pub albedo: Vec<Vec<f64>>,
+    /// The largest of all.
+    pub largest: f64,
+    /// Whether it is at most 1.
+    pub conserved: bool,
+    /// Whether the fit was held to that.
+    pub constrained: bool,
+}
+
+/// How the global minimum was looked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SearchRecord {
+    /// Starts polished.
+    pub starts: u64,
+    /// Of them, how many ended in the lowest minimum.
+    pub reached: u64,
+    /// Distinct minima seen.
+    pub minima: u64,
+    /// Cost of the second lowest minimum over the lowest's, less 1.
+    pub runner_up_excess: Option<f64>,
+    /// Chance that another random start would find a minimum not seen before (Boender & Rinnooy Kan 1987); none where the cost was bracketed
+    /// over the whole range of its one shape.
+    pub unseen_chance: Option<f64>,
+}
+
+/// A fit to a part of the samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SubsetRecord {
+    /// Directions fitted.
+    pub samples: u64,
+    /// Directions there are.
+    pub of: u64,
+    /// By which share the rmse over all samples is expected to exceed that of a fit to all.
+    pub rmse_excess: f64,
+    /// What it exceeds with probability 5 % at most.
+    pub rmse_excess_95: f64,
+}
+
+/// Standard errors from redrawn data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BootstrapRecord {
+    /// Data sets drawn.
+    pub replicates: u64,
+    /// Standard deviation of each parameter over them.
+    pub standard_error: Vec<LobeRecord<Option<f64>>>,
 }
 
 /// One number (or pair) for each parameter of a lobe.

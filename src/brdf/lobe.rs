@@ -45,27 +45,12 @@ pub trait Lobe: Send + Sync + std::fmt::Debug {
         }
     }
 
-    /// [`Lobe::fill`] for `count` shapes from `low` on, each twice the one before, to about 1e-10: enough to see where minima
-    /// lie. For lobes with one shape parameter.
-    fn fill_octaves(&self, low: f64, count: usize, coordinates: &[f64]) -> Octaves {
-        let fill = |k: usize| {
-            let mut values = vec![0.0; coordinates.len()];
-            let mut derivatives = vec![vec![0.0; coordinates.len()]];
-            self.fill(&[octave(low, k)], coordinates, &mut values, &mut derivatives);
-            (values, derivatives.swap_remove(0))
-        };
-        (0..count).map(fill).unzip()
+    /// The lobe's normalisation c(n) and its derivative by n, where its value is c(n)·exp(n·coordinate) with the one shape
+    /// parameter n; `None` for other lobes. All sums over samples of such lobes come from one pass, whatever the shapes.
+    fn power(&self, _n: f64) -> Option<(f64, f64)> {
+        None
     }
 }
-
-/// `low` · 2^`k`.
-#[must_use]
-pub fn octave(low: f64, k: usize) -> f64 {
-    low * (k as f64).exp2()
-}
-
-/// Values and derivatives by the first shape parameter, one list a shape.
-pub type Octaves = (Vec<Vec<f64>>, Vec<Vec<f64>>);
 
 /// Most shape parameters that a lobe may have.
 pub const MAX_PARAMETERS: usize = 4;
@@ -108,6 +93,15 @@ impl LobeKind {
     #[must_use]
     pub fn is_flat(self) -> bool {
         matches!(self, Self::Lambert2d | Self::Phong2d)
+    }
+
+    /// The lobe in the flat world that corresponds to it.
+    #[must_use]
+    pub fn flat_twin(self) -> Self {
+        match self {
+            Self::Lambert | Self::Lambert2d => Self::Lambert2d,
+            Self::Phong | Self::Phong2d => Self::Phong2d,
+        }
     }
 
     /// One line for the user.

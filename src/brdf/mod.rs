@@ -13,8 +13,11 @@ pub mod material;
 pub mod phong;
 pub mod spec;
 
-pub use file::{FitRecord, LobeRecord, MaterialError};
-pub use lobe::{Lobe, LobeKind, Octaves, Parameter};
+pub use file::{
+    BootstrapRecord, Correlation, EnergyRecord, FitRecord, LobeRecord, MaterialError, ResidualRecord, SearchRecord,
+    SubsetRecord,
+};
+pub use lobe::{Lobe, LobeKind, Parameter};
 pub use material::{LobeTerm, Material, PerChannel, Reflectance};
 pub use spec::{ModelSpec, SpecError};
 

@@ -8,8 +8,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec3;
 
-use super::lobe::{Lobe, Octaves, Parameter, above_horizon, ln_cos_alpha, octave};
+use super::lobe::{Lobe, Parameter, above_horizon, ln_cos_alpha};
 use crate::numeric::quadrature::integrate;
+use crate::numeric::simd::{Kernel, exp, vectorised};
 use crate::radiometry::flat::phong2d_normalisation;
 
 /// The exponent n; the fit searches this range.
@@ -52,8 +53,12 @@ impl Lobe for Phong {
         p * (n + 2.0)
     }
 
-    fn fill_octaves(&self, low: f64, count: usize, coordinates: &[f64]) -> Octaves {
-        octaves(low, count, coordinates, |n| ((n + 2.0) / TAU, 1.0 / TAU))
+    fn fill(&self, shape: &[f64], coordinates: &[f64], values: &mut [f64], derivatives: &mut [Vec<f64>]) {
+        fill((shape[0], (shape[0] + 2.0) / TAU, 1.0 / TAU), coordinates, values, derivatives);
+    }
+
+    fn power(&self, n: f64) -> Option<(f64, f64)> {
+        Some(((n + 2.0) / TAU, 1.0 / TAU))
     }
 }
 
@@ -78,28 +83,54 @@ impl Lobe for Phong2d {
         p * norm
     }
 
-    fn fill_octaves(&self, low: f64, count: usize, coordinates: &[f64]) -> Octaves {
-        octaves(low, count, coordinates, flat_normalization)
+    fn fill(&self, shape: &[f64], coordinates: &[f64], values: &mut [f64], derivatives: &mut [Vec<f64>]) {
+        let (norm, slope) = flat_normalization(shape[0]);
+        fill((shape[0], norm, slope), coordinates, values, derivatives);
+    }
+
+    fn power(&self, n: f64) -> Option<(f64, f64)> {
+        Some(flat_normalization(n))
     }
 }
 
-/// Octave-spaced lobes by repeated squaring, cos²ⁿα = (cosⁿα)²: one multiplication instead of one exponential each. A fresh
-/// exponential every 16 octaves keeps the growing rounding error below 2¹⁶ units in the last place. `norm` gives a lobe's
-/// normalisation and its derivative.
-fn octaves(low: f64, count: usize, coordinates: &[f64], norm: impl Fn(f64) -> (f64, f64)) -> Octaves {
-    let mut powers = vec![0.0; coordinates.len()];
-    let lobe = |k: usize| {
-        let n = octave(low, k);
-        if k.is_multiple_of(16) {
-            powers.iter_mut().zip(coordinates).for_each(|(p, x)| *p = power(n, *x));
-        } else {
-            powers.iter_mut().for_each(|p| *p *= *p);
+/// Values norm·cosⁿα and derivatives (norm·ln cosα + slope)·cosⁿα of many coordinates.
+fn fill(
+    (exponent, norm, slope): (f64, f64, f64),
+    coordinates: &[f64],
+    values: &mut [f64],
+    derivatives: &mut [Vec<f64>],
+) {
+    let mut unused = Vec::new();
+    let derivatives = derivatives.first_mut().unwrap_or(&mut unused);
+    derivatives.resize(coordinates.len(), 0.0);
+    vectorised(Fill { exponent, norm, slope, coordinates, values, derivatives });
+}
+
+struct Fill<'a> {
+    exponent: f64,
+    norm: f64,
+    slope: f64,
+    coordinates: &'a [f64],
+    values: &'a mut [f64],
+    derivatives: &'a mut [f64],
+}
+
+impl Kernel for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let n = self.coordinates.len();
+        let (values, derivatives) = (&mut self.values[..n], &mut self.derivatives[..n]);
+        for i in 0..n {
+            let x = self.coordinates[i];
+            let lit = x > f64::NEG_INFINITY;
+            let x = if lit { x } else { 0.0 };
+            let p = exp(self.exponent * x);
+            values[i] = if lit { p * self.norm } else { 0.0 };
+            derivatives[i] = if lit { p * self.norm.mul_add(x, self.slope) } else { 0.0 };
         }
-        let (scale, slope) = norm(n);
-        let derivative = |(p, x): (&f64, &f64)| if *p == 0.0 { 0.0 } else { p * (scale * x + slope) };
-        (powers.iter().map(|p| p * scale).collect(), powers.iter().zip(coordinates).map(derivative).collect())
-    };
-    (0..count).map(lobe).unzip()
+    }
 }
 
 /// c(n) = Γ((n+3)/2)/(√π·Γ((n+2)/2)), which makes ∫ c cosⁿα cosα dα = 1 over [−π/2, π/2], and its derivative by n, c/2 times the
@@ -269,20 +300,25 @@ mod tests {
     }
 
     #[test]
-    fn octaves_are_the_lobes_themselves() {
-        let coordinates: Vec<f64> =
-            [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, f64::INFINITY].map(|x: f64| -x).to_vec();
+    fn many_coordinates_at_once_are_the_lobes_themselves() {
+        let coordinates: Vec<f64> = [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, 30.0, f64::INFINITY].map(|x: f64| -x).to_vec();
         for lobe in [&Phong as &dyn Lobe, &Phong2d] {
-            let (values, derivatives) = lobe.fill_octaves(0.01, 34, &coordinates);
-            for (k, (values, derivatives)) in values.iter().zip(&derivatives).enumerate() {
-                let n = octave(0.01, k);
+            for n in [1e-300, 0.01, 1.0, 7.0, 123.0, 5e4, 1e8] {
+                let (mut values, mut derivatives) = (vec![0.0; 10], vec![vec![0.0; 10]]);
+                lobe.fill(&[n], &coordinates, &mut values, &mut derivatives);
+                let (norm, _) = lobe.power(n).expect("a power");
                 for (i, x) in coordinates.iter().enumerate() {
                     let mut slope = [0.0];
                     let value = lobe.value(&[n], *x, &mut slope);
-                    assert!((values[i] - value).abs() <= 1e-10 * value, "n {n} x {x}: {} vs {value}", values[i]);
+                    let bound = 4e-16 * (1.0 + (n * x).abs().min(750.0)) * value + 1e-290;
+                    assert!((values[i] - value).abs() <= bound, "n {n} x {x}: {} vs {value}", values[i]);
                     // The two terms of the slope cancel near its root: judge by their size.
                     let size = value * (1.0 / (n + 2.0) + if x.is_finite() { x.abs() } else { 0.0 });
-                    assert!((derivatives[i] - slope[0]).abs() <= 1e-10 * size, "n {n} x {x}");
+                    let near = (derivatives[0][i] - slope[0]).abs() <= 1e-13 * (1.0 + (n * x).abs().min(750.0)) * size + 1e-280;
+                    assert!(near, "n {n} x {x}: {} vs {}", derivatives[0][i], slope[0]);
+                    if x.is_finite() {
+                        assert!((norm * (n * x).exp() - value).abs() <= 1e-15 * value);
+                    }
                 }
             }
         }

@@ -50,15 +50,7 @@ impl ModelSpec {
     /// The same model in the flat world (`phong` → `phong2d`).
     #[must_use]
     pub fn flattened(&self) -> Self {
-        Self(
-            self.0
-                .iter()
-                .map(|kind| match kind {
-                    LobeKind::Lambert | LobeKind::Lambert2d => LobeKind::Lambert2d,
-                    LobeKind::Phong | LobeKind::Phong2d => LobeKind::Phong2d,
-                })
-                .collect(),
-        )
+        Self(self.0.iter().map(|kind| kind.flat_twin()).collect())
     }
 }
 

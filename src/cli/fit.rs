@@ -47,7 +47,7 @@ pub(super) struct Args {
 }
 
 fn parse_loss(text: &str) -> Result<Loss, String> {
-    Loss::ALL.into_iter().find(|l| l.name() == text).ok_or_else(|| "known are l2, cosine-l2".into())
+    Loss::from_name(text).ok_or_else(|| format!("known are {}", Loss::ALL.map(Loss::name).join(", ")))
 }
 
 fn parse_weights(text: &str) -> Result<WeightMode, String> {

@@ -1,40 +1,11 @@
 //! What a fit is asked for, and why it may refuse.
 
+use std::time::Duration;
+
+use super::limits::Limit;
+use super::loss::{Loss, Robust};
 use crate::brdf::ModelSpec;
 use crate::measurement::{Dimension, Measurement};
-
-/// What is minimised: the residual r of one sample and channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Loss {
-    /// r = f − f̂.
-    L2,
-    /// r = cosθi (f − f̂) (Ngan, Durand, Matusik 2005).
-    #[default]
-    CosineL2,
-}
-
-impl Loss {
-    /// All losses.
-    pub const ALL: [Self; 2] = [Self::L2, Self::CosineL2];
-
-    /// Its name in options and files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::L2 => "l2",
-            Self::CosineL2 => "cosine-l2",
-        }
-    }
-
-    /// ∂r/∂f of a sample with this cosine of the incident angle.
-    #[must_use]
-    pub fn slope(self, cos_i: f64) -> f64 {
-        match self {
-            Self::L2 => 1.0,
-            Self::CosineL2 => cos_i,
-        }
-    }
-}
 
 /// How samples count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,6 +28,15 @@ impl WeightMode {
     }
 }
 
+/// Draws of the bootstrap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bootstrap {
+    /// How many data sets are redrawn.
+    pub replicates: u32,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
 /// Options of [`super::fit`].
 #[derive(Debug, Clone)]
 pub struct FitOptions {
@@ -66,26 +46,71 @@ pub struct FitOptions {
     pub loss: Loss,
     /// The weights.
     pub weights: WeightMode,
+    /// Weigh by 1/σ_r² instead, with the σ that the measurement states; no solid angle then.
+    pub use_sigma: bool,
+    /// Lets outliers count less.
+    pub robust: Option<Robust>,
     /// Samples with θi or θo above this (degrees, (0, 90]) are left out; the limit itself is in.
     pub max_angle_deg: f64,
+    /// Every how many-th entry of the measurement is used, from the first on; at least 1.
+    pub stride: usize,
+    /// Shapes of their own for every channel.
+    pub per_channel: bool,
+    /// Ranges of single parameters; a range of one point fixes it.
+    pub limits: Vec<Limit>,
+    /// Fit under the constraint that no channel reflects more than it receives.
+    pub conserve_energy: bool,
+    /// Time that the fit may take; it then works on as many samples as that allows.
+    pub time_budget: Option<Duration>,
+    /// Largest share by which the rmse over all samples may exceed the best one's (0.01 for 1 %), with 95 % confidence.
+    pub target_rmse_excess: Option<f64>,
+    /// Standard errors by redrawing the data, beside the analytic ones.
+    pub bootstrap: Option<Bootstrap>,
     /// Most steps of the solver from one start.
     pub max_iterations: u64,
 }
 
 impl FitOptions {
-    /// The defaults for a model: `cosine-l2`, solid-angle weights, 80°.
+    /// The defaults for a model: `cosine-l2`, solid-angle weights, 80°, all samples.
     #[must_use]
     pub fn new(model: ModelSpec) -> Self {
-        Self { model, loss: Loss::default(), weights: WeightMode::default(), max_angle_deg: 80.0, max_iterations: 100 }
+        Self {
+            model,
+            loss: Loss::default(),
+            weights: WeightMode::default(),
+            use_sigma: false,
+            robust: None,
+            max_angle_deg: 80.0,
+            stride: 1,
+            per_channel: false,
+            limits: Vec::new(),
+            conserve_energy: false,
+            time_budget: None,
+            target_rmse_excess: None,
+            bootstrap: None,
+            max_iterations: 100,
+        }
     }
 
-    pub(super) fn validate(&self) -> Result<(), FitError> {
+    pub(super) fn validate(&self, measurement: &Measurement) -> Result<(), FitError> {
+        let wrong = |field, expected, found: String| Err(FitError::Option { field, expected, found });
         if !(self.max_angle_deg > 0.0 && self.max_angle_deg <= 90.0) {
-            return Err(FitError::Option {
-                field: "max-angle",
-                expected: "an angle in (0, 90] degrees",
-                found: self.max_angle_deg.to_string(),
-            });
+            return wrong("max-angle", "an angle in (0, 90] degrees", self.max_angle_deg.to_string());
+        }
+        if self.stride == 0 {
+            return wrong("stride", "at least 1", "0".into());
+        }
+        if let Some(excess) = self.target_rmse_excess.filter(|e| !(*e > 0.0 && e.is_finite())) {
+            return wrong("target-rmse-excess", "a positive share", excess.to_string());
+        }
+        if let Some(robust) = self.robust.filter(|r| !(r.scale > 0.0 && r.scale.is_finite())) {
+            return wrong("robust", "a positive scale", robust.scale.to_string());
+        }
+        if self.bootstrap.is_some_and(|b| b.replicates < 2) {
+            return wrong("bootstrap", "at least 2 replicates", "fewer".into());
+        }
+        if self.use_sigma && measurement.sigma.is_none() {
+            return wrong("use-sigma", "a measurement that states sigma", "none stated".into());
         }
         Ok(())
     }
@@ -117,6 +142,22 @@ pub enum FitError {
         expected: &'static str,
         /// What was given.
         found: String,
+    },
+    /// A limit that fits nothing.
+    #[error("{name}: there is no such parameter to limit; expected {expected}")]
+    Limit {
+        /// The parameter as it was named.
+        name: String,
+        /// What it could have been.
+        expected: String,
+    },
+    /// Limits that can't all be met.
+    #[error("channel {channel}: the least weights allowed reflect {least} in all, more than the light that energy conservation leaves")]
+    Infeasible {
+        /// The channel.
+        channel: String,
+        /// Sum of the least weights.
+        least: f64,
     },
     /// No sample is left.
     #[error(

@@ -3,9 +3,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::samples::Samples;
+use super::loss::{Loss, Robust, RobustKind};
+use super::samples::{Block, Samples};
+use super::transform::Transform;
 use crate::brdf::LobeKind;
-use crate::numeric::sum::fold_blocks;
+use crate::numeric::simd::{Kernel, dot, dot3, vectorised};
 
 /// A lobe of the model at given shapes (natural units).
 #[derive(Debug, Clone)]
@@ -14,52 +16,52 @@ pub(super) struct ShapedLobe {
     pub shape: Vec<f64>,
 }
 
+/// How residuals count: a robust loss with its s (in the residual's unit), if any.
+pub(super) type Saturation = Option<(RobustKind, f64)>;
+
+/// s of a robust loss for residuals of this σ.
+pub(super) fn saturation(robust: Option<Robust>, sigma: f64) -> Saturation {
+    robust.map(|r| (r.kind, r.scale * sigma))
+}
+
 /// Basis columns of one block: lobe values φ, then for each shape parameter dφ/dt with t = ln(shape).
-struct Columns {
-    phi: Vec<Vec<f64>>,
-    slope: Vec<Vec<f64>>,
+#[derive(Debug, Default)]
+pub(super) struct Columns {
+    pub all: Vec<Vec<f64>>,
+    lobes: usize,
 }
 
-fn columns(samples: &Samples, lobes: &[ShapedLobe], block: std::ops::Range<usize>) -> Columns {
-    let mut out = Columns { phi: Vec::new(), slope: Vec::new() };
-    for lobe in lobes {
-        let (phi, slopes) = basis(samples, lobe.kind, &lobe.shape, block.clone());
-        out.phi.push(phi);
-        out.slope.extend(slopes);
-    }
-    out
-}
-
-/// Values of one lobe over a block, and its derivatives by t = ln(shape).
-pub(super) fn basis(
-    samples: &Samples,
-    kind: LobeKind,
-    shape: &[f64],
-    block: std::ops::Range<usize>,
-) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let coordinate = &samples.coordinate(kind)[block];
-    let mut phi = vec![0.0; coordinate.len()];
-    let mut slopes = vec![vec![0.0; coordinate.len()]; shape.len()];
-    kind.lobe().fill(shape, coordinate, &mut phi, &mut slopes);
-    for (list, s) in slopes.iter_mut().zip(shape) {
-        list.iter_mut().for_each(|d| *d *= s);
-    }
-    (phi, slopes)
-}
-
-/// Σ a·b with eight running sums: the compiler can use vector registers, and the bracketing is fixed.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (mut lanes, (a8, b8)) = ([0.0f64; 8], (a.chunks_exact(8), b.chunks_exact(8)));
-    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            lanes[k] += x[k] * y[k];
+impl Columns {
+    pub fn fill(block: &Block, lobes: &[ShapedLobe]) -> Self {
+        let n = block.len();
+        let mut all = Vec::new();
+        let mut slopes = Vec::new();
+        for lobe in lobes {
+            let mut phi = vec![0.0; n];
+            let mut own = vec![vec![0.0; n]; lobe.shape.len()];
+            lobe.kind.lobe().fill(&lobe.shape, &block.x, &mut phi, &mut own);
+            for (list, s) in own.iter_mut().zip(&lobe.shape) {
+                list.iter_mut().for_each(|d| *d *= s);
+            }
+            all.push(phi);
+            slopes.extend(own);
         }
+        let count = all.len();
+        all.extend(slopes);
+        Self { all, lobes: count }
     }
-    lanes.iter().sum::<f64>() + rest
+
+    /// Σ x φ.
+    pub fn model(&self, x: &DVector<f64>) -> Vec<f64> {
+        let mut f = vec![0.0; self.all.first().map_or(0, Vec::len)];
+        for (phi, x) in self.all[..self.lobes].iter().zip(x.iter()) {
+            f.iter_mut().zip(phi).for_each(|(f, p)| *f = x.mul_add(*p, *f));
+        }
+        f
+    }
 }
 
-/// Sums of products for given shapes. `K` columns: the lobe values, then their slopes.
+/// Gram matrices and data vectors of a linear loss. `K` columns: the lobe values, then their slopes.
 #[derive(Debug, Clone)]
 pub(super) struct Moments {
     /// Σ w g² col·col, one matrix for each weight list.
@@ -73,119 +75,261 @@ impl Moments {
     pub fn gram(&self, channel: usize) -> &DMatrix<f64> {
         if self.gram.len() == 1 { &self.gram[0] } else { &self.gram[channel] }
     }
+}
 
-    fn symmetric(mut self) -> Self {
-        self.gram.iter_mut().for_each(DMatrix::fill_upper_triangle_with_lower_triangle);
-        self
+/// w g² of a linear loss over a block, list by list.
+fn omega(samples: &Samples<'_>, block: &Block) -> Vec<Vec<f64>> {
+    let of = |c: usize| {
+        let g = samples.gain(block, c);
+        block.weight(c).iter().zip(&g).map(|(w, g)| w * g * g).collect()
+    };
+    (0..samples.lists()).map(of).collect()
+}
+
+/// The transforms of a linear loss's weights and weighted data (measures: lists, then channels), and each channel's energy
+/// Σ w g² y².
+pub(super) fn transform(samples: &Samples<'_>) -> (Transform, Vec<f64>) {
+    // Each piece has its own sums: few enough that adding them costs nothing, and as many whatever the number of threads.
+    let (lists, channels) = (samples.lists(), samples.channels.len());
+    let parts = samples.map_pieces(PIECES, || (Transform::new(lists + channels), vec![0.0; channels]), |sums, block| {
+        let mut values = omega(samples, block);
+        for c in 0..channels {
+            let weight = &values[if lists == 1 { 0 } else { c }];
+            let wy: Vec<f64> = weight.iter().zip(&block.y[c]).map(|(w, y)| w * y).collect();
+            sums.1[c] += vectorised(Dot(&wy, &block.y[c]));
+            values.push(wy);
+        }
+        sums.0.absorb(&block.x, &values);
+    });
+    let mut total = (Transform::new(lists + channels), vec![0.0; channels]);
+    for (part, energy) in &parts {
+        total.0.merge(part);
+        total.1.iter_mut().zip(energy).for_each(|(t, e)| *t += e);
+    }
+    total
+}
+
+/// Pieces that a pass with large sums is cut into; it fixes how they are bracketed.
+const PIECES: usize = 16;
+
+struct Dot<'a>(&'a [f64], &'a [f64]);
+
+impl Kernel for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        dot(self.0, self.1)
     }
 }
 
-/// One pass for [`Moments`]; with `slopes` also of the derivative columns.
-pub(super) fn moments(samples: &Samples, lobes: &[ShapedLobe], slopes: bool) -> Moments {
-    let parameters: usize = lobes.iter().map(|l| l.shape.len()).sum();
-    let k = lobes.len() + if slopes { parameters } else { 0 };
-    let zero = Moments {
-        gram: vec![DMatrix::zeros(k, k); samples.weight_lists()],
-        data: vec![DVector::zeros(k); samples.data.len()],
-    };
-    fold_blocks(
-        samples.len(),
-        zero.clone(),
-        |block| {
-            let basis = columns(samples, lobes, block.clone());
-            let mut sums = zero.clone();
-            let mut weighted = vec![Vec::new(); k];
-            for channel in 0..samples.data.len() {
-                let fresh = channel < samples.weight_lists();
-                let data = &samples.data[channel][block.clone()];
-                for (a, column) in basis.phi.iter().chain(&basis.slope).take(k).enumerate() {
-                    if fresh {
-                        weighted[a] = weigh(samples, channel, block.clone(), column);
-                        for (b, other) in basis.phi.iter().chain(&basis.slope).take(a + 1).enumerate() {
-                            sums.gram[channel][(a, b)] = dot(&weighted[a], other);
-                        }
-                    }
-                    sums.data[channel][a] = dot(&weighted[a], data);
-                }
-            }
-            sums
-        },
-        |total, part| {
-            total.gram.iter_mut().zip(&part.gram).for_each(|(t, p)| *t += p);
-            total.data.iter_mut().zip(&part.data).for_each(|(t, p)| *t += p);
-        },
-    )
-    .symmetric()
-}
-
-/// w g² · column over a block.
-fn weigh(samples: &Samples, channel: usize, block: std::ops::Range<usize>, column: &[f64]) -> Vec<f64> {
-    let (w, g) = (&samples.weight(channel)[block.clone()], &samples.slope[block]);
-    w.iter().zip(g).zip(column).map(|((w, g), x)| w * g * g * x).collect()
-}
-
-/// Sums over true residuals r = g (Σ x φ − y).
+/// The quadratic model of one channel's cost about given weights and shapes, by [weights, t of every shape parameter]. The slopes are
+/// of the bare lobes: a lobe's weight is not multiplied in.
 #[derive(Debug, Clone)]
-pub(super) struct Residuals {
-    /// Σ w r² over all channels.
+pub(super) struct Sums {
+    /// Σ w r² (robust: Σ w s² ρ).
     pub cost: f64,
-    /// Σ w r g φ_l, per channel and lobe: what is left of the weights' normal equations.
-    pub lobes: Vec<DVector<f64>>,
-    /// Σ over channels of x_l Σ w r g dφ_l/dt, per shape parameter: half the cost's gradient.
-    pub shapes: DVector<f64>,
+    /// Half the cost's gradient.
+    pub gradient: DVector<f64>,
+    /// Gauss–Newton matrix Σ w ρ′ (∂r/∂f)² col·col; empty where it was not asked for.
+    pub normal: DMatrix<f64>,
+}
+
+/// What a pass over residuals is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Want {
+    /// Cost and gradient by weights and shapes.
+    Gradient,
+    /// The normal matrix by the weights too.
+    Weights,
+    /// The normal matrix by weights and shapes.
+    All,
 }
 
 /// One pass over true residuals for given shapes and weights (`weights[channel][lobe]`).
-pub(super) fn residuals(samples: &Samples, lobes: &[ShapedLobe], weights: &[DVector<f64>]) -> Residuals {
-    let owner: Vec<usize> = lobes.iter().enumerate().flat_map(|(l, lobe)| vec![l; lobe.shape.len()]).collect();
-    let zero = Residuals {
-        cost: 0.0,
-        lobes: vec![DVector::zeros(lobes.len()); samples.data.len()],
-        shapes: DVector::zeros(owner.len()),
-    };
-    fold_blocks(
-        samples.len(),
-        zero.clone(),
-        |block| {
-            let basis = columns(samples, lobes, block.clone());
+pub(super) fn sums(
+    samples: &Samples<'_>,
+    lobes: &[ShapedLobe],
+    weights: &[DVector<f64>],
+    saturation: Saturation,
+    want: Want,
+) -> Vec<Sums> {
+    let slopes: usize = lobes.iter().map(|l| l.shape.len()).sum();
+    let columns = lobes.len() + if want == Want::Weights { 0 } else { slopes };
+    let matrix = if want == Want::Gradient { 0 } else { columns };
+    let zero = Sums { cost: 0.0, gradient: DVector::zeros(columns), normal: DMatrix::zeros(matrix, matrix) };
+    let parts = samples.map_blocks(|block| {
+        let basis = Columns::fill(block, lobes);
+        let channel = |(c, x): (usize, &DVector<f64>)| {
+            let residuals = Residuals::at(samples, block, c, &basis.model(x), saturation);
             let mut sums = zero.clone();
-            for (channel, x) in weights.iter().enumerate() {
-                let (w, g) = (&samples.weight(channel)[block.clone()], &samples.slope[block.clone()]);
-                let mut r: Vec<f64> = samples.data[channel][block.clone()].iter().map(|y| -y).collect();
-                for (phi, x) in basis.phi.iter().zip(x.iter()) {
-                    r.iter_mut().zip(phi).for_each(|(r, p)| *r += x * p);
-                }
-                r.iter_mut().zip(g).for_each(|(r, g)| *r *= g);
-                let wr: Vec<f64> = r.iter().zip(w).map(|(r, w)| w * r).collect();
-                sums.cost += dot(&wr, &r);
-                let wrg: Vec<f64> = wr.iter().zip(g).map(|(r, g)| r * g).collect();
-                for (l, phi) in basis.phi.iter().enumerate() {
-                    sums.lobes[channel][l] = dot(&wrg, phi);
-                }
-                for (p, slope) in basis.slope.iter().enumerate() {
-                    sums.shapes[p] += x[owner[p]] * dot(&wrg, slope);
-                }
-            }
+            sums.cost = residuals.cost;
+            vectorised(Products { columns: &basis.all[..columns], of: &residuals, into: &mut sums });
             sums
-        },
-        |total, part| {
+        };
+        weights.iter().enumerate().map(channel).collect::<Vec<Sums>>()
+    });
+    let mut total = vec![zero.clone(); weights.len()];
+    for part in parts {
+        for (total, part) in total.iter_mut().zip(part) {
             total.cost += part.cost;
-            total.shapes += part.shapes;
-            total.lobes.iter_mut().zip(&part.lobes).for_each(|(t, p)| *t += p);
-        },
-    )
+            total.gradient += part.gradient;
+            total.normal += part.normal;
+        }
+    }
+    total.iter_mut().for_each(|s| s.normal.fill_upper_triangle_with_lower_triangle());
+    total
 }
 
-/// Jacobian rows of one block for the covariance: lobe values and the slopes by t, each times g.
-pub(super) fn jacobian_block(
-    samples: &Samples,
-    lobes: &[ShapedLobe],
-    block: std::ops::Range<usize>,
-) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-    let mut basis = columns(samples, lobes, block.clone());
-    let g = &samples.slope[block];
-    for column in basis.phi.iter_mut().chain(basis.slope.iter_mut()) {
-        column.iter_mut().zip(g).for_each(|(x, g)| *x *= g);
+/// Residuals of one channel over a block, and what follows from them.
+pub(super) struct Residuals {
+    /// r.
+    pub r: Vec<f64>,
+    /// ∂r/∂f.
+    pub slope: Vec<f64>,
+    /// ρ′, the robust weight; 1 without a robust loss.
+    pub trust: Vec<f64>,
+    /// w ρ′ r ∂r/∂f: half the cost's slope by f.
+    pub pull: Vec<f64>,
+    /// w ρ′ (∂r/∂f)².
+    pub curvature: Vec<f64>,
+    /// Σ w s² ρ.
+    pub cost: f64,
+}
+
+impl Residuals {
+    /// At the model values `f`.
+    pub fn at(samples: &Samples<'_>, block: &Block, channel: usize, f: &[f64], saturation: Saturation) -> Self {
+        let n = block.len();
+        let gain = samples.gain(block, channel);
+        let zero = || vec![0.0; n];
+        let mut out = Self { r: zero(), slope: zero(), trust: zero(), pull: zero(), curvature: zero(), cost: 0.0 };
+        let targets;
+        let target = if samples.loss.is_linear() {
+            &block.y[channel]
+        } else {
+            let datum = |(y, c): (&f64, &f64)| super::loss::Datum { value: *y, cos_i: *c, epsilon: 0.0 };
+            targets = block.y[channel].iter().zip(&block.cos_i).map(|p| samples.loss.target(datum(p))).collect::<Vec<_>>();
+            &targets
+        };
+        let w = block.weight(channel);
+        let data = Data { f, cos_i: &block.cos_i, gain: &gain, target, w };
+        vectorised(Evaluate { loss: samples.loss, saturation, data, out: &mut out });
+        out
     }
-    (basis.phi, basis.slope)
+}
+
+/// What the residuals of a block are made of.
+struct Data<'a> {
+    f: &'a [f64],
+    cos_i: &'a [f64],
+    gain: &'a [f64],
+    target: &'a [f64],
+    w: &'a [f64],
+}
+
+struct Evaluate<'a> {
+    loss: Loss,
+    saturation: Saturation,
+    data: Data<'a>,
+    out: &'a mut Residuals,
+}
+
+impl Kernel for Evaluate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // One loop a loss, so that each is free of branches.
+        match self.loss {
+            Loss::Log => self.of_loss(|f, c, g, t| Loss::Log.prepared(f, c, g, t)),
+            Loss::CubeRoot => self.of_loss(|f, c, g, t| Loss::CubeRoot.prepared(f, c, g, t)),
+            _ => self.of_loss(|f, _, g, t| (g * (f - t), g)),
+        }
+    }
+}
+
+impl Evaluate<'_> {
+    #[inline(always)]
+    fn of_loss(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64)) {
+        match self.saturation {
+            None => self.each(residual, |r| (r * r, 1.0)),
+            Some((kind, s)) => {
+                let (square, inverse) = (s * s, 1.0 / (s * s));
+                let rho = |r: f64| {
+                    let (rho, weight, _) = kind.rho(r * r * inverse);
+                    (square * rho, weight)
+                };
+                self.each(residual, rho);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn each(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64), rho: impl Fn(f64) -> (f64, f64)) {
+        let n = self.data.f.len();
+        let Data { f, cos_i, gain, target, w } = self.data;
+        let (f, cos_i, gain, target, w) = (&f[..n], &cos_i[..n], &gain[..n], &target[..n], &w[..n]);
+        let out = self.out;
+        let (r, slope, trust) = (&mut out.r[..n], &mut out.slope[..n], &mut out.trust[..n]);
+        let (pull, curvature) = (&mut out.pull[..n], &mut out.curvature[..n]);
+        for i in 0..n {
+            let (ri, si) = residual(f[i], cos_i[i], gain[i], target[i]);
+            let (cost, ti) = rho(ri);
+            r[i] = ri;
+            slope[i] = si;
+            trust[i] = ti;
+            let ws = w[i] * ti * si;
+            curvature[i] = ws * si;
+            // The cost waits where the pull will stand.
+            pull[i] = cost;
+        }
+        out.cost = dot(w, pull);
+        for i in 0..n {
+            pull[i] = w[i] * trust[i] * slope[i] * r[i];
+        }
+    }
+}
+
+/// Products of the columns with each other and with the residuals.
+struct Products<'a> {
+    columns: &'a [Vec<f64>],
+    of: &'a Residuals,
+    into: &'a mut Sums,
+}
+
+impl Kernel for Products<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (a, column) in self.columns.iter().enumerate() {
+            self.into.gradient[a] = dot(&self.of.pull, column);
+            if self.into.normal.nrows() > a {
+                for (b, other) in self.columns[..=a].iter().enumerate() {
+                    self.into.normal[(a, b)] = dot3(&self.of.curvature, column, other);
+                }
+            }
+        }
+    }
+}
+
+/// Σ weight·col·col for several weights at once, lower triangles.
+pub(super) struct Weighted<'a> {
+    pub columns: &'a [Vec<f64>],
+    pub weight: &'a [f64],
+    pub into: &'a mut DMatrix<f64>,
+}
+
+impl Kernel for Weighted<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (a, column) in self.columns.iter().enumerate() {
+            for (b, other) in self.columns[..=a].iter().enumerate() {
+                self.into[(a, b)] += dot3(self.weight, column, other);
+            }
+        }
+    }
 }

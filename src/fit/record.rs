@@ -1,21 +1,24 @@
-//! From the solver's numbers to the material and its record.
+//! From the fit's numbers to the material and its record.
 
-use super::covariance::Uncertainty;
+use super::energy;
+use super::limits::{Ranges, TINY_SHAPE};
 use super::options::{FitOptions, WeightMode};
-use super::solver::{Outcome, Stop};
-use super::varpro::{Profile, Solution};
-use crate::brdf::{FitRecord, LobeRecord, LobeTerm, Material, PerChannel};
+use super::part::Part;
+use super::solver::Stop;
+use crate::brdf::{
+    Correlation, FitRecord, LobeKind, LobeRecord, LobeTerm, Material, ModelSpec, PerChannel, ResidualRecord, SearchRecord,
+};
 use crate::measurement::Measurement;
 
-/// All that a record is made of.
+/// All that a record is made of: one part for all channels, or one a channel.
 pub(super) struct Facts<'a> {
     pub measurement: &'a Measurement,
     pub options: &'a FitOptions,
-    pub problem: &'a Profile<'a>,
-    pub solution: &'a Solution,
-    pub uncertainty: &'a Uncertainty,
-    pub outcome: &'a Outcome,
-    pub seconds: f64,
+    pub model: &'a ModelSpec,
+    pub ranges: &'a Ranges,
+    pub parts: &'a [Part],
+    /// Directions that count in at least one channel.
+    pub samples: usize,
 }
 
 /// One lobe of the result, before lobes of one kind are put in order.
@@ -23,63 +26,152 @@ struct Row {
     term: LobeTerm,
     error: LobeRecord<Option<f64>>,
     interval: LobeRecord<Option<(f64, f64)>>,
+    model_error: LobeRecord<Option<f64>>,
 }
+
+/// Correlations of more parameters than this are left out.
+const MOST_CORRELATED: usize = 40;
+/// Share of structure in the residuals' variance from which it is warned of.
+const STRUCTURED: f64 = 0.25;
 
 /// The fitted material with its record.
 pub(super) fn material(facts: &Facts<'_>) -> Material {
-    let mut rows: Vec<Row> = (0..facts.problem.kinds.len()).map(|l| facts.row(l)).collect();
-    sort_lobes_of_one_kind(&mut rows);
-    let samples = facts.problem.samples;
-    let mut record = FitRecord {
-        status: facts.status().into(),
-        loss: facts.options.loss.name().into(),
-        weights: if samples.solid_angle { WeightMode::SolidAngle } else { WeightMode::Uniform }.name().into(),
-        samples: samples.len() as u64,
-        cost: facts.solution.cost * samples.scale * samples.scale,
-        rmse: (facts.solution.cost / samples.residuals().max(1) as f64).sqrt() * samples.scale,
-        iterations: facts.outcome.history.len().saturating_sub(1) as u64,
-        seconds: facts.seconds,
-        ..FitRecord::default()
-    };
-    let mut lobes = Vec::new();
-    for row in rows {
-        lobes.push(row.term);
+    let mut rows: Vec<Row> = (0..facts.model.lobes().len()).map(|l| facts.row(l)).collect();
+    let order = order_of(&rows, &facts.ranges.limited);
+    let mut material = Material { channels: facts.measurement.channels.clone(), lobes: Vec::new(), fit: None };
+    let mut record = facts.numbers();
+    let structured = record.residual.as_ref().is_some_and(|r| r.structured_share > STRUCTURED);
+    let mut sorted: Vec<Option<Row>> = rows.drain(..).map(Some).collect();
+    for row in order.iter().filter_map(|&l| sorted[l].take()) {
+        material.lobes.push(row.term);
         record.standard_error.push(row.error);
         record.interval_95.push(row.interval);
+        if structured {
+            record.model_error.push(row.model_error);
+        }
     }
-    let mut material = Material { channels: facts.measurement.channels.clone(), lobes, fit: None };
     record.undetermined = undetermined(&material, &record.standard_error);
-    record.warnings = facts.warnings(&record);
-    record.warnings.extend(energy_warning(&material));
+    record.correlation = facts.correlation(&order);
+    record.energy = energy::energy(&material, facts.options.conserve_energy);
+    record.warnings = facts.warnings(&material, &record);
     material.fit = Some(record);
     material
 }
 
 impl Facts<'_> {
-    fn row(&self, l: usize) -> Row {
-        let kind = self.problem.kinds[l];
-        let q = self.uncertainty.quantile;
-        let unit = self.problem.samples.scale;
-        let weight: Vec<f64> = self.solution.weights.iter().map(|x| x[l] * unit).collect();
-        let dark = weight.iter().all(|w| *w == 0.0);
-        let errors: Vec<Option<f64>> = self.uncertainty.weights.iter().map(|e| e[l].map(|e| e * unit)).collect();
-        // A weight is never negative, so neither is its interval.
-        let around = |(w, e): (&f64, &Option<f64>)| finite(e.map(|e| ((w - q * e).max(0.0), w + q * e)));
-        let mut row = Row {
-            error: LobeRecord { weight: errors.clone(), shape: Vec::new() },
-            interval: LobeRecord { weight: weight.iter().zip(&errors).map(around).collect(), shape: Vec::new() },
-            term: LobeTerm { kind, weight, shape: None },
+    fn numbers(&self) -> FitRecord {
+        let unit = |p: &Part| self.options.loss.cost_unit(p.scale);
+        let residuals: usize = self.parts.iter().flat_map(|p| &p.counts).sum();
+        let cost: f64 = self.parts.iter().map(|p| p.solution.cost * unit(p)).sum();
+        let solid_angle = self.options.robust.is_some();
+        let epsilon = |p: &Part| p.epsilon.iter().map(|e| e * p.scale).collect::<Vec<f64>>();
+        let relative = self.options.loss == super::Loss::Relative;
+        FitRecord {
+            status: self.status().into(),
+            loss: self.options.loss.name().into(),
+            weights: self.parts[0].weighting.into(),
+            robust: self.options.robust.map(|r| r.to_string()),
+            robust_scale: if solid_angle {
+                self.parts.iter().filter_map(|p| p.saturation.map(|(_, s)| s * unit(p).sqrt())).collect()
+            } else {
+                Vec::new()
+            },
+            relative_epsilon: if relative { self.parts.iter().flat_map(epsilon).collect() } else { Vec::new() },
+            limits: self.options.limits.iter().map(ToString::to_string).collect(),
+            samples: self.samples as u64,
+            cost,
+            rmse: (cost / residuals.max(1) as f64).sqrt(),
+            iterations: self.parts.iter().map(|p| p.history.len().saturating_sub(1) as u64).sum(),
+            residual: self.residual(),
+            search: Some(self.search()),
+            ..FitRecord::default()
+        }
+    }
+
+    fn residual(&self) -> Option<ResidualRecord> {
+        let all = self.parts.iter().map(|p| p.structure.map(|s| (p, s))).collect::<Option<Vec<_>>>()?;
+        let total = |of: &dyn Fn(&Part, &super::structure::Structure) -> f64| -> f64 {
+            let residuals: f64 = all.iter().flat_map(|(p, _)| &p.counts).map(|n| *n as f64).sum();
+            let sum: f64 = all.iter().map(|(p, s)| of(p, s) * p.counts.iter().sum::<usize>() as f64).sum();
+            sum / residuals
         };
+        let unit = |p: &Part| self.options.loss.cost_unit(p.scale);
+        let noise = total(&|p, s| s.noise * s.noise * unit(p)).sqrt();
+        let model = total(&|p, s| s.model * s.model * unit(p)).sqrt();
+        let both = noise * noise + model * model;
+        Some(ResidualRecord {
+            noise_rmse: noise,
+            model_rmse: model,
+            structured_share: if both > 0.0 { model * model / both } else { 0.0 },
+            noise_from: if all[0].1.from_sigma { "sigma" } else { "neighbours" }.into(),
+            effective_samples: all.iter().map(|(_, s)| s.effective_samples).sum(),
+        })
+    }
+
+    fn search(&self) -> SearchRecord {
+        let largest = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+        let start = SearchRecord { starts: 0, reached: 0, minima: 0, runner_up_excess: None, unseen_chance: None };
+        self.parts.iter().map(|p| &p.report).fold(start, |sum, r| SearchRecord {
+            starts: sum.starts + r.starts as u64,
+            reached: sum.reached + r.reached as u64,
+            minima: sum.minima.max(r.minima as u64),
+            runner_up_excess: least(sum.runner_up_excess, r.runner_up_excess),
+            unseen_chance: largest(sum.unseen_chance, r.unseen),
+        })
+    }
+
+    /// The part that fitted a channel, and the channel's place in it.
+    fn of_channel(&self, channel: usize) -> (&Part, usize) {
+        let find = |p: &Part| p.channels.iter().position(|c| *c == channel);
+        let found = self.parts.iter().find_map(|p| find(p).map(|c| (p, c)));
+        found.unwrap_or((&self.parts[0], 0))
+    }
+
+    fn row(&self, l: usize) -> Row {
+        let (kind, lobes) = (self.model.lobes()[l], self.model.lobes().len());
+        let channels = 0..self.measurement.channels.len();
+        let weight = |c: usize| {
+            let (part, c) = self.of_channel(c);
+            part.solution.weights[c][l] * part.scale
+        };
+        let at = |c: usize| {
+            let (part, c) = self.of_channel(c);
+            (part, c * lobes + l, part.scale)
+        };
+        let error = |c: usize| {
+            let (part, i, unit) = at(c);
+            part.uncertainty.errors[i].map(|e| e * unit)
+        };
+        let interval = |c: usize| {
+            let (part, i, unit) = at(c);
+            finite(part.intervals[i].map(|(low, high)| (low * unit, high * unit)))
+        };
+        let model_error = |c: usize| {
+            let (part, i, unit) = at(c);
+            part.uncertainty.errors[i].map(|_| part.uncertainty.structured[i] * unit)
+        };
+        let mut row = Row {
+            term: LobeTerm { kind, weight: channels.clone().map(weight).collect(), shape: None },
+            error: LobeRecord { weight: channels.clone().map(error).collect(), shape: Vec::new() },
+            interval: LobeRecord { weight: channels.clone().map(interval).collect(), shape: Vec::new() },
+            model_error: LobeRecord { weight: channels.map(model_error).collect(), shape: Vec::new() },
+        };
+        let dark = row.term.weight.iter().all(|w| *w == 0.0);
         let mut shape = Vec::new();
-        for (i, (_, parameter)) in self.problem.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l) {
-            let value = self.solution.t[i].exp();
-            // An error wider than the whole range that is searched means that the data leave the shape open.
-            let range = (parameter.bounds.1 / parameter.bounds.0).ln();
-            let error = self.uncertainty.ln_shapes[i].filter(|e| !dark && *e < range);
-            shape.push(PerChannel::Shared(value));
-            row.error.shape.push((parameter.name.into(), PerChannel::Shared(error.map(|e| e * value))));
-            let interval = finite(error.map(|e| (value * (-q * e).exp(), value * (q * e).exp())));
-            row.interval.shape.push((parameter.name.into(), PerChannel::Shared(interval)));
+        for (own, parameter) in kind.lobe().parameters().iter().enumerate() {
+            let values: Vec<ShapeValue> = self.parts.iter().map(|p| p.shape_value(l, own)).collect();
+            shape.push(shared(&values, |v| v.value));
+            let name = || parameter.name.to_owned();
+            row.error.shape.push((name(), shared(&values, |v| v.error)));
+            row.interval.shape.push((name(), shared(&values, |v| v.interval)));
+            row.model_error.shape.push((name(), shared(&values, |v| v.model_error)));
         }
         if !dark || shape.is_empty() {
             row.term.shape = Some(shape);
@@ -88,17 +180,53 @@ impl Facts<'_> {
     }
 
     fn status(&self) -> &'static str {
-        let bounds = self.problem.bounds();
-        let at_end = |i: usize| self.solution.t[i] <= bounds[i].0 || self.solution.t[i] >= bounds[i].1;
-        let lit = |lobe: usize| self.solution.weights.iter().any(|x| x[lobe] > 0.0);
-        match self.outcome.stop {
-            Stop::MaxIterations => "max-iterations",
-            _ if self.problem.layout.iter().enumerate().any(|(i, (lobe, _))| at_end(i) && lit(*lobe)) => "at-bound",
-            _ => "converged",
+        let at_bound = |p: &Part| {
+            let t = &p.solution.t;
+            let ends = |i: usize| {
+                let (low, high) = p.bounds[i];
+                low < high && (t[i] <= low || t[i] >= high)
+            };
+            p.layout.iter().enumerate().any(|(i, (lobe, _))| ends(i) && p.lit(*lobe))
+        };
+        if self.parts.iter().any(|p| matches!(p.stop, Stop::MaxIterations)) {
+            "max-iterations"
+        } else if self.parts.iter().any(at_bound) {
+            "at-bound"
+        } else {
+            "converged"
         }
     }
 
-    fn warnings(&self, record: &FitRecord) -> Vec<String> {
+    /// Correlations, the lobes in the order of the result.
+    fn correlation(&self, order: &[usize]) -> Option<Correlation> {
+        let [part] = self.parts else { return None };
+        let lobes = self.model.lobes();
+        if part.uncertainty.errors.len() > MOST_CORRELATED {
+            return None;
+        }
+        let sorted: Vec<LobeKind> = order.iter().map(|&l| lobes[l]).collect();
+        let name = |place: usize| lobe_name(&sorted, place);
+        let (mut parameters, mut index) = (Vec::new(), Vec::new());
+        for (place, &l) in order.iter().enumerate() {
+            for (c, channel) in self.measurement.channels.iter().enumerate() {
+                parameters.push(format!("{}.weight[{channel}]", name(place)));
+                index.push(c * lobes.len() + l);
+            }
+            for (i, (_, parameter)) in part.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l) {
+                parameters.push(format!("{}.{}", name(place), parameter.name));
+                index.push(self.measurement.channels.len() * lobes.len() + i);
+            }
+        }
+        let known = |i: usize| part.uncertainty.errors[i].filter(|e| *e > 0.0);
+        let entry = |&i: &usize, &j: &usize| {
+            let (a, b) = (known(i)?, known(j)?);
+            Some(if i == j { 1.0 } else { (part.uncertainty.covariance[(i, j)] / (a * b)).clamp(-1.0, 1.0) })
+        };
+        let matrix = index.iter().map(|i| index.iter().map(|j| entry(i, j)).collect()).collect();
+        Some(Correlation { parameters, matrix })
+    }
+
+    fn warnings(&self, material: &Material, record: &FitRecord) -> Vec<String> {
         let mut list = Vec::new();
         if !record.undetermined.is_empty() {
             list.push(format!("the data do not determine {}", record.undetermined.join(", ")));
@@ -111,25 +239,77 @@ impl Facts<'_> {
         if record.status == "max-iterations" {
             list.push("the search used up its steps before it converged".into());
         }
-        if self.options.weights == WeightMode::SolidAngle && !self.problem.samples.solid_angle {
+        if self.options.weights == WeightMode::SolidAngle && self.parts[0].weighting == WeightMode::Uniform.name() {
             list.push("the measurement has no grid, so every sample counts the same (uniform weights)".into());
         }
-        for (channel, _) in self.measurement.channels.iter().zip(&self.problem.samples.counts).filter(|(_, n)| **n == 0)
-        {
-            list.push(format!("channel {channel} has no valid sample"));
+        for (c, channel) in self.measurement.channels.iter().enumerate() {
+            let (part, own) = self.of_channel(c);
+            if part.counts[own] == 0 {
+                list.push(format!("channel {channel} has no valid sample"));
+            }
         }
+        let refused: usize = self.parts.iter().map(|p| p.refused).sum();
+        if refused > 0 {
+            list.push(format!("{refused} values are too negative for the logarithm of the loss and were left out"));
+        }
+        list.extend(self.structure_warning(record));
+        list.extend(record.energy.as_ref().and_then(|e| energy::warning(material, e)));
         list
+    }
+
+    /// Says in plain words that the model can't bend as the material does.
+    fn structure_warning(&self, record: &FitRecord) -> Option<String> {
+        let residual = record.residual.as_ref().filter(|r| r.structured_share > STRUCTURED)?;
+        Some(format!(
+            "the model does not describe these data: {:.0} % of the residuals' variance is structure, not noise (model error {:.3e}, noise \
+             {:.1e}); the standard errors are of noise alone, `model_error` says how far the model's own error moves the parameters",
+            100.0 * residual.structured_share,
+            residual.model_rmse,
+            residual.noise_rmse,
+        ))
     }
 }
 
-/// Says where the material reflects more than it receives. The directional albedo of every lobe is largest at normal incidence.
-fn energy_warning(material: &Material) -> Option<String> {
-    let albedo = material.directional_albedo(0.0)?;
-    let (channel, most) = albedo.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    let name = &material.channels[channel];
-    (*most > 1.0).then(|| {
-        format!("the fit reflects {most:.3} of the light at normal incidence (channel {name}): more than it receives")
-    })
+/// A shape parameter of one part, in natural units.
+struct ShapeValue {
+    value: f64,
+    error: Option<f64>,
+    interval: Option<(f64, f64)>,
+    model_error: Option<f64>,
+}
+
+impl Part {
+    fn lit(&self, lobe: usize) -> bool {
+        self.solution.weights.iter().any(|x| x[lobe] > 0.0)
+    }
+
+    /// Parameter `own` of lobe `l`.
+    fn shape_value(&self, l: usize, own: usize) -> ShapeValue {
+        let of_lobe = self.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l).map(|(i, _)| i);
+        let Some(i) = of_lobe.clone().nth(own) else {
+            return ShapeValue { value: f64::NAN, error: None, interval: None, model_error: None };
+        };
+        let value = self.solution.t[i].exp();
+        let place = self.solution.weights.len() * self.solution.lobes.len() + i;
+        let (low, high) = self.bounds[i];
+        if low == high {
+            let value = if value <= 2.0 * TINY_SHAPE { 0.0 } else { low.exp() };
+            return ShapeValue { value, error: Some(0.0), interval: Some((value, value)), model_error: Some(0.0) };
+        }
+        // An error wider than the whole range that is searched means that the data leave the shape open.
+        let error = self.uncertainty.errors[place].filter(|e| self.lit(l) && *e < high - low);
+        let interval = error.and_then(|_| self.intervals[place]).map(|(low, high)| (low.exp(), high.exp()));
+        let model_error = error.map(|_| self.uncertainty.structured[place] * value);
+        ShapeValue { value, error: error.map(|e| e * value), interval: finite(interval), model_error }
+    }
+}
+
+/// One value for all channels, or one a channel.
+fn shared<T: Copy>(values: &[ShapeValue], of: impl Fn(&ShapeValue) -> T) -> PerChannel<T> {
+    match values {
+        [one] => PerChannel::Shared(of(one)),
+        many => PerChannel::Each(many.iter().map(of).collect()),
+    }
 }
 
 /// An interval with both ends finite, else none: a file has no form for infinity.
@@ -137,18 +317,35 @@ fn finite(interval: Option<(f64, f64)>) -> Option<(f64, f64)> {
     interval.filter(|(low, high)| low.is_finite() && high.is_finite())
 }
 
-/// Lobes of one kind by ascending mean exponent, at the places that the model gives to their kind; dark ones last.
-fn sort_lobes_of_one_kind(rows: &mut [Row]) {
-    let key = |row: &Row| {
-        let shape = row.term.shape_of(0).unwrap_or_else(|| vec![f64::INFINITY]);
-        shape.first().copied().unwrap_or(0.0)
+/// The lobes' order in the result: those of one kind by ascending mean exponent, at the places that the model gives to their kind; dark ones
+/// last. Lobes with limits of their own keep their places.
+fn order_of(rows: &[Row], limited: &[LobeKind]) -> Vec<usize> {
+    let key = |l: usize| {
+        let Some(shape) = &rows[l].term.shape else { return f64::INFINITY };
+        match shape.first() {
+            None => 0.0,
+            Some(PerChannel::Shared(x)) => *x,
+            Some(PerChannel::Each(list)) => list.iter().sum::<f64>() / list.len() as f64,
+        }
     };
-    for i in 0..rows.len() {
-        for j in i + 1..rows.len() {
-            if rows[i].term.kind == rows[j].term.kind && key(&rows[j]) < key(&rows[i]) {
-                rows.swap(i, j);
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    for i in 0..order.len() {
+        for j in i + 1..order.len() {
+            let (a, b) = (order[i], order[j]);
+            let kind = rows[a].term.kind;
+            if kind == rows[b].term.kind && !limited.contains(&kind) && key(b) < key(a) {
+                order.swap(i, j);
             }
         }
+    }
+    order
+}
+
+/// What lobe `l` of these kinds is called: `phong`, `phong[1]` for the second of the kind.
+fn lobe_name(kinds: &[LobeKind], l: usize) -> String {
+    match kinds[..l].iter().filter(|k| **k == kinds[l]).count() {
+        0 => kinds[l].name().into(),
+        k => format!("{}[{k}]", kinds[l].name()),
     }
 }
 
@@ -159,8 +356,16 @@ fn undetermined(material: &Material, errors: &[LobeRecord<Option<f64>>]) -> Vec<
         let lobe = material.lobe_name(l);
         let open = error.weight.iter().zip(&material.channels).filter(|(e, _)| e.is_none());
         names.extend(open.map(|(_, c)| format!("{lobe}.weight[{c}]")));
-        let open = error.shape.iter().filter(|(_, e)| *e == PerChannel::Shared(None));
-        names.extend(open.map(|(name, _)| format!("{lobe}.{name}")));
+        for (name, error) in &error.shape {
+            match error {
+                PerChannel::Shared(error) if error.is_none() => names.push(format!("{lobe}.{name}")),
+                PerChannel::Shared(_) => {}
+                PerChannel::Each(list) => {
+                    let open = list.iter().zip(&material.channels).filter(|(e, _)| e.is_none());
+                    names.extend(open.map(|(_, c)| format!("{lobe}.{name}[{c}]")));
+                }
+            }
+        }
     }
     names
 }

@@ -1,76 +1,48 @@
-//! What a fit sees of a measurement: the samples that count, with their weights, data and lobe coordinates.
+//! What a fit sees of a measurement: the samples that count, with their weights, data and lobe coordinates, block by block.
+//!
+//! A MERL table's samples are made block by block from the table itself; of any other measurement they are listed once.
 
+use std::ops::Range;
+
+use glam::DVec3;
 use rayon::prelude::*;
 
+use super::loss::{Datum, Loss, RELATIVE_EPSILON};
+use super::merl_lines::MerlLines;
 use super::options::{FitError, FitOptions, WeightMode};
 use crate::brdf::{LobeKind, ModelSpec};
-use crate::measurement::Measurement;
-use crate::numeric::sum;
-
-/// Samples with a positive weight in at least one channel, in the measurement's order, structure of arrays.
-#[derive(Debug)]
-pub(super) struct Samples {
-    /// Index of each sample in the measurement.
-    pub index: Vec<u32>,
-    /// ∂r/∂f of each sample.
-    pub slope: Vec<f64>,
-    /// Normalised weight w, one list for all channels or one a channel (0 where that channel is masked).
-    weight: Vec<Vec<f64>>,
-    /// Measured value of each channel over [`Samples::scale`], 0 where masked.
-    pub data: Vec<Vec<f64>>,
-    /// The power of two that the data were divided by, so that no unit of theirs over- or underflows when squared.
-    pub scale: f64,
-    /// Σ w g² y² of each channel's data.
-    pub energy: Vec<f64>,
-    /// Samples with a positive weight in each channel.
-    pub counts: Vec<usize>,
-    /// Coordinate of each distinct lobe kind of the model.
-    coordinates: Vec<(LobeKind, Vec<f64>)>,
-    /// Whether the solid angles asked for were there.
-    pub solid_angle: bool,
-}
+use crate::measurement::{Directions, Measurement};
+use crate::numeric::sum::{self, BLOCK};
 
 /// Slack in the cosine that makes the angular limit inclusive whatever the rounding of the direction.
 const INCLUSIVE: f64 = 1e-12;
 
-enum Left {
-    Below,
-    Beyond,
-    Masked,
-    Weightless,
+/// Samples of a list that are taken as one when model error is judged.
+const CLUSTER: usize = 64;
+
+/// Samples in a row, structure of arrays. Lists by channel hold the channels of the fit, in its order.
+#[derive(Debug, Default, Clone)]
+pub(super) struct Block {
+    /// Index of each sample in the measurement.
+    pub index: Vec<u32>,
+    /// cosθi.
+    pub cos_i: Vec<f64>,
+    /// Coordinate of the lobes that have a shape.
+    pub x: Vec<f64>,
+    /// Normalised weight w, one list for all channels or one a channel; 0 where masked.
+    pub w: Vec<Vec<f64>>,
+    /// Measured value over [`Samples::scale`], one list a channel; 0 where masked.
+    pub y: Vec<Vec<f64>>,
 }
 
-impl Samples {
-    /// Selects and prepares the samples.
-    pub fn gather(measurement: &Measurement, model: &ModelSpec, options: &FitOptions) -> Result<Self, FitError> {
-        let solid_angle = options.weights == WeightMode::SolidAngle && measurement.weights.known();
-        let picked = pick(measurement, options, solid_angle)?;
-        let index: Vec<u32> = picked.iter().map(|p| p.0).collect();
-        let raw: Vec<f64> = picked.iter().map(|p| p.1).collect();
-        let slope: Vec<f64> = picked.iter().map(|p| p.2).collect();
-        drop(picked);
-        let (weight, counts) = channel_weights(measurement, &index, &raw);
-        let scale = scale_of(measurement, &index)?;
-        let data: Vec<Vec<f64>> = (0..measurement.channels.len())
-            .map(|c| {
-                let plane = measurement.plane(c);
-                let value = |&i: &u32| if plane[i as usize].is_nan() { 0.0 } else { plane[i as usize] / scale };
-                index.par_iter().map(value).collect()
-            })
-            .collect();
-        let mut kinds: Vec<LobeKind> = model.lobes().to_vec();
-        kinds.sort_unstable();
-        kinds.dedup();
-        let coordinates = coordinates(measurement, &index, &kinds);
-        let mut samples =
-            Self { index, slope, weight, data, scale, energy: Vec::new(), counts, coordinates, solid_angle };
-        samples.energy = (0..samples.data.len()).map(|c| samples.channel_energy(c)).collect();
-        Ok(samples)
-    }
-
-    fn channel_energy(&self, channel: usize) -> f64 {
-        let (w, y) = (self.weight(channel), &self.data[channel]);
-        sum::sum_blocks(self.len(), |i| w[i] * (self.slope[i] * y[i]).powi(2))
+impl Block {
+    fn reset(&mut self, lists: usize, channels: usize) {
+        self.index.clear();
+        self.cos_i.clear();
+        self.x.clear();
+        self.w.resize_with(lists, Vec::new);
+        self.y.resize_with(channels, Vec::new);
+        self.w.iter_mut().chain(&mut self.y).for_each(Vec::clear);
     }
 
     /// Number of samples.
@@ -80,118 +52,497 @@ impl Samples {
 
     /// Weights of one channel.
     pub fn weight(&self, channel: usize) -> &[f64] {
-        if self.weight.len() == 1 { &self.weight[0] } else { &self.weight[channel] }
+        if self.w.len() == 1 { &self.w[0] } else { &self.w[channel] }
     }
 
-    /// Number of distinct weight lists: 1 where all channels share one.
-    pub fn weight_lists(&self) -> usize {
-        self.weight.len()
+    /// The samples ordered by direction, so that neighbours stand together and the order of the file does not matter.
+    fn neighbours_together(&self, wi: &[DVec3], wo: &[DVec3]) -> Self {
+        let mut order: Vec<([i32; 4], u32)> = (0..self.len() as u32)
+            .into_par_iter()
+            .map(|k| {
+                let entry = self.index[k as usize] as usize;
+                let ([a, b], [c, d]) = (place(wi[entry]), place(wo[entry]));
+                ([a, b, c, d], k)
+            })
+            .collect();
+        order.par_sort_unstable();
+        let pick = |list: &Vec<f64>| order.iter().map(|(_, k)| list[*k as usize]).collect();
+        Self {
+            index: order.iter().map(|(_, k)| self.index[*k as usize]).collect(),
+            cos_i: pick(&self.cos_i),
+            x: pick(&self.x),
+            w: self.w.iter().map(pick).collect(),
+            y: self.y.iter().map(pick).collect(),
+        }
     }
 
-    /// Coordinates of one lobe kind; empty for a kind that the model lacks.
-    pub fn coordinate(&self, kind: LobeKind) -> &[f64] {
-        self.coordinates.iter().find(|(k, _)| *k == kind).map_or(&[], |(_, list)| list)
+    fn append(&mut self, other: &Self) {
+        self.index.extend_from_slice(&other.index);
+        self.cos_i.extend_from_slice(&other.cos_i);
+        self.x.extend_from_slice(&other.x);
+        let pairs = self.w.iter_mut().chain(&mut self.y).zip(other.w.iter().chain(&other.y));
+        pairs.for_each(|(list, more)| list.extend_from_slice(more));
+    }
+}
+
+/// A direction's polar ring and its place on it, coarse enough to overlook rounding.
+fn place(w: DVec3) -> [i32; 2] {
+    const STEPS: f64 = 1e5;
+    // The azimuth by the way round a square: monotone, and cheaper than an arctangent.
+    let size = w.x.abs() + w.y.abs();
+    let round = if size > 1e-9 { w.y / size } else { 0.0 };
+    let round = if w.x < 0.0 { 2.0 - round } else { round };
+    [(w.z * STEPS).round() as i32, (round * STEPS).round() as i32]
+}
+
+#[derive(Debug)]
+enum Source {
+    Listed(Block),
+    Merl(MerlLines),
+}
+
+/// The samples with a positive weight in at least one channel, in the measurement's order.
+#[derive(Debug)]
+pub(super) struct Samples<'a> {
+    /// The table they come from.
+    pub measurement: &'a Measurement,
+    /// The measurement's channels that are fitted.
+    pub channels: Vec<usize>,
+    source: Source,
+    /// The loss they were prepared for.
+    pub loss: Loss,
+    /// Directions that count.
+    count: usize,
+    /// Distinct weight lists: 1 where all channels share one.
+    lists: usize,
+    /// What each raw weight of a table is multiplied by, list by list.
+    factor: Vec<f64>,
+    /// The power of two that the data were divided by, so that no unit of theirs over- or underflows when squared.
+    pub scale: f64,
+    /// Samples with a positive weight in each channel.
+    pub counts: Vec<usize>,
+    /// ε of the relative loss, channel by channel, in the fit's scale.
+    pub epsilon: Vec<f64>,
+    /// Values that the loss can't take.
+    pub refused: usize,
+    /// How the samples were weighted: `solid-angle`, `uniform` or `sigma`.
+    pub weighting: &'static str,
+}
+
+/// What the first look at the data finds, channel by channel.
+#[derive(Debug, Clone)]
+struct Survey {
+    directions: usize,
+    counts: Vec<usize>,
+    weights: Vec<f64>,
+    absolute: Vec<f64>,
+    largest: f64,
+    alike: bool,
+}
+
+impl<'a> Samples<'a> {
+    /// Selects and prepares the samples of the given channels.
+    pub fn gather(
+        measurement: &'a Measurement,
+        model: &ModelSpec,
+        options: &FitOptions,
+        channels: &[usize],
+    ) -> Result<Self, FitError> {
+        let solid_angle = options.weights == WeightMode::SolidAngle && measurement.weights.known();
+        let weighting = match (options.use_sigma, solid_angle) {
+            (true, _) => "sigma",
+            (false, true) => WeightMode::SolidAngle.name(),
+            (false, false) => WeightMode::Uniform.name(),
+        };
+        let mut samples = Self {
+            measurement,
+            channels: channels.to_vec(),
+            source: Source::Listed(Block::default()),
+            loss: options.loss,
+            count: 0,
+            lists: channels.len(),
+            factor: vec![1.0; channels.len()],
+            scale: 1.0,
+            counts: Vec::new(),
+            epsilon: vec![0.0; channels.len()],
+            refused: 0,
+            weighting,
+        };
+        if let Some(lines) = samples.lines(options, solid_angle) {
+            samples.source = Source::Merl(lines);
+        } else {
+            let kind = model.lobes().iter().copied().find(|k| !k.lobe().parameters().is_empty());
+            samples.list(kind, options, solid_angle)?;
+        }
+        let survey = samples.survey();
+        samples.settle(&survey, options)?;
+        Ok(samples)
+    }
+
+    /// A MERL table needs no lists where every sample counts and its weight is plain.
+    fn lines(&self, options: &FitOptions, solid_angle: bool) -> Option<MerlLines> {
+        let Directions::Merl(grid) = self.measurement.directions else { return None };
+        let own = !solid_angle || matches!(self.measurement.weights, crate::measurement::Weights::Merl);
+        let plain = options.loss.is_linear() && !options.use_sigma && options.stride == 1 && own;
+        plain.then(|| MerlLines::new(grid, least_cos(options), solid_angle))
+    }
+
+    /// Number of directions that count.
+    pub fn len(&self) -> usize {
+        self.count
     }
 
     /// Residuals in all: samples × channels, masked ones left out.
     pub fn residuals(&self) -> usize {
         self.counts.iter().sum()
     }
-}
 
-/// (index, raw weight, slope) of every sample that counts.
-fn pick(measurement: &Measurement, options: &FitOptions, solid_angle: bool) -> Result<Vec<(u32, f64, f64)>, FitError> {
-    let least = options.max_angle_deg.to_radians().cos() - INCLUSIVE;
-    let judge = |i: usize| -> Result<(u32, f64, f64), Left> {
-        let (wi, wo) = measurement.directions.pair(i);
-        if !(wi.z > 0.0 && wo.z > 0.0) {
-            return Err(Left::Below);
+    /// Distinct weight lists of the linear problem: 1 where all channels share one.
+    pub fn lists(&self) -> usize {
+        if self.loss == Loss::Relative { self.channels.len() } else { self.lists }
+    }
+
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        match &self.source {
+            Source::Listed(all) => all.len().div_ceil(BLOCK),
+            Source::Merl(_) => MerlLines::blocks(),
         }
-        if wi.z < least || wo.z < least {
-            return Err(Left::Beyond);
-        }
-        if (0..measurement.channels.len()).all(|c| measurement.value(c, i).is_none()) {
-            return Err(Left::Masked);
-        }
-        let weight = if solid_angle { measurement.weights.get(i) } else { 1.0 };
-        if weight > 0.0 { Ok((i as u32, weight, options.loss.slope(wi.z))) } else { Err(Left::Weightless) }
-    };
-    let blocks = sum::map_blocks(measurement.len(), |block| {
-        let (mut kept, mut left) = (Vec::with_capacity(block.len()), [0usize; 4]);
-        for i in block {
-            match judge(i) {
-                Ok(sample) => kept.push(sample),
-                Err(reason) => left[reason as usize] += 1,
+    }
+
+    /// Maps every block in parallel and returns the results in order.
+    pub fn map_blocks<T: Send>(&self, map: impl Fn(&Block) -> T + Sync + Send) -> Vec<T> {
+        let step = |block: &mut Block, b: usize| {
+            self.fill(b, block);
+            map(block)
+        };
+        (0..self.blocks()).into_par_iter().map_init(Block::default, step).collect()
+    }
+
+    /// Cuts the samples into at most `pieces` runs of blocks; each folds its blocks in order into sums of its own. Results in
+    /// order.
+    pub fn map_pieces<T: Send>(
+        &self,
+        pieces: usize,
+        start: impl Fn() -> T + Sync + Send,
+        add: impl Fn(&mut T, &Block) + Sync + Send,
+    ) -> Vec<T> {
+        let blocks = self.blocks();
+        let pieces = pieces.min(blocks).max(1);
+        let run = |p: usize| {
+            let (mut sums, mut block) = (start(), Block::default());
+            for b in blocks * p / pieces..blocks * (p + 1) / pieces {
+                self.fill(b, &mut block);
+                add(&mut sums, &block);
+            }
+            sums
+        };
+        (0..pieces).into_par_iter().map(run).collect()
+    }
+
+    /// Writes block `b` into `block`.
+    fn fill(&self, b: usize, block: &mut Block) {
+        block.reset(self.lists, self.channels.len());
+        match &self.source {
+            Source::Listed(all) => {
+                let range = b * BLOCK..((b + 1) * BLOCK).min(all.len());
+                block.index.extend_from_slice(&all.index[range.clone()]);
+                block.cos_i.extend_from_slice(&all.cos_i[range.clone()]);
+                block.x.extend_from_slice(&all.x[range.clone()]);
+                let pairs = block.w.iter_mut().chain(&mut block.y).zip(all.w.iter().chain(&all.y));
+                pairs.for_each(|(to, from)| to.extend_from_slice(&from[range.clone()]));
+            }
+            Source::Merl(lines) => {
+                for line in lines.lines(b) {
+                    lines.append(&line, block);
+                    self.append_values(line.entries(), line.weight, block);
+                }
             }
         }
-        (kept, left)
-    });
-    let mut left = [0; 4];
-    let mut picked = Vec::with_capacity(blocks.iter().map(|b| b.0.len()).sum());
-    for (kept, reasons) in blocks {
-        picked.extend(kept);
-        left.iter_mut().zip(reasons).for_each(|(sum, n)| *sum += n);
     }
-    if picked.is_empty() {
-        return Err(FitError::NothingToFit {
-            name: measurement.name.clone(),
-            entries: measurement.len(),
-            below: left[Left::Below as usize],
-            beyond: left[Left::Beyond as usize],
-            masked: left[Left::Masked as usize],
-            weightless: left[Left::Weightless as usize],
-            max_angle_deg: options.max_angle_deg,
+
+    /// Appends weights and values of entries in a row of a table.
+    fn append_values(&self, entries: Range<usize>, weight: f64, block: &mut Block) {
+        let unit = 1.0 / self.scale;
+        for (c, y) in block.y.iter_mut().enumerate() {
+            let plane = &self.measurement.plane(self.channels[c])[entries.clone()];
+            y.extend(plane.iter().map(|v| if v.is_nan() { 0.0 } else { v * unit }));
+            if c < self.lists {
+                let w = weight * self.factor[c];
+                block.w[c].extend(plane.iter().map(|v| if v.is_nan() { 0.0 } else { w }));
+            }
+        }
+        block.index.extend(entries.map(|e| e as u32));
+    }
+
+    /// Lists every sample that counts, with raw weights.
+    fn list(&mut self, kind: Option<LobeKind>, options: &FitOptions, solid_angle: bool) -> Result<(), FitError> {
+        let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle, kind };
+        let parts = sum::map_blocks(self.measurement.len(), |range| judge.list(range));
+        let mut left = Left::default();
+        let mut all = Block::default();
+        all.reset(self.lists, self.channels.len());
+        for (part, reasons) in parts {
+            all.append(&part);
+            left.add(&reasons);
+        }
+        self.refused = left.refused;
+        if all.len() == 0 {
+            return Err(left.error(self.measurement, options.max_angle_deg));
+        }
+        // Weights may have any size: their sum must not overflow.
+        let largest = all.w.iter().flatten().copied().fold(0.0, f64::max);
+        all.w.iter_mut().flatten().for_each(|w| *w /= largest);
+        if let Directions::List { wi, wo } = &self.measurement.directions {
+            all = all.neighbours_together(wi, wo);
+        }
+        self.source = Source::Listed(all);
+        Ok(())
+    }
+
+    /// Looks at all samples once.
+    fn survey(&self) -> Survey {
+        let channels = self.channels.len();
+        let empty = Survey {
+            directions: 0,
+            counts: vec![0; channels],
+            weights: vec![0.0; channels],
+            absolute: vec![0.0; channels],
+            largest: 0.0,
+            alike: true,
+        };
+        let parts = self.map_blocks(|block| {
+            let mut found = empty.clone();
+            let masked = |c: usize, i: usize| block.w[c][i] == 0.0;
+            for c in 0..channels {
+                let (w, y) = (&block.w[c], &block.y[c]);
+                found.counts[c] = w.iter().filter(|w| **w > 0.0).count();
+                found.weights[c] = w.iter().sum();
+                found.absolute[c] = w.iter().zip(y).map(|(w, y)| w * y.abs()).sum();
+                found.largest = y.iter().fold(found.largest, |m, y| m.max(y.abs()));
+                found.alike &= *w == block.w[0];
+            }
+            found.directions = (0..block.len()).filter(|&i| !(0..channels).all(|c| masked(c, i))).count();
+            found
         });
-    }
-    Ok(picked)
-}
-
-/// The power of two next to the largest value; 1 for data that are all 0.
-fn scale_of(measurement: &Measurement, index: &[u32]) -> Result<f64, FitError> {
-    let largest_in = |c: usize| {
-        let plane = measurement.plane(c);
-        index.par_iter().map(|&i| plane[i as usize].abs()).filter(|v| !v.is_nan()).reduce(|| 0.0, f64::max)
-    };
-    let largest = (0..measurement.channels.len()).map(largest_in).fold(0.0, f64::max);
-    // The cost is reported in the data's unit squared.
-    if !(largest * largest * index.len() as f64).is_finite() {
-        return Err(FitError::Overflow { name: measurement.name.clone(), largest });
-    }
-    Ok(if largest > 0.0 { largest.log2().floor().exp2() } else { 1.0 })
-}
-
-/// Weights normalised to Σw = number of samples, channel by channel, as one list where all channels have the same mask.
-fn channel_weights(measurement: &Measurement, index: &[u32], raw: &[f64]) -> (Vec<Vec<f64>>, Vec<usize>) {
-    let channels = measurement.channels.len();
-    let largest = raw.iter().copied().fold(0.0, f64::max); // of any size: sums must not overflow
-    let masked = |c: usize, i: u32| measurement.plane(c)[i as usize].is_nan();
-    let alike = index.par_iter().all(|&i| (1..channels).all(|c| masked(c, i) == masked(0, i)));
-    let lists: Vec<(Vec<f64>, usize)> = (0..if alike { 1 } else { channels })
-        .map(|c| {
-            let mut w: Vec<f64> =
-                index.par_iter().zip(raw).map(|(&i, &w)| if masked(c, i) { 0.0 } else { w / largest }).collect();
-            let count = w.iter().filter(|w| **w > 0.0).count();
-            let total = sum::sum_blocks(w.len(), |i| w[i]);
-            if total > 0.0 {
-                w.par_iter_mut().for_each(|w| *w *= count as f64 / total);
+        parts.into_iter().fold(empty, |mut sum, part| {
+            sum.directions += part.directions;
+            sum.largest = sum.largest.max(part.largest);
+            sum.alike &= part.alike;
+            for c in 0..channels {
+                sum.counts[c] += part.counts[c];
+                sum.weights[c] += part.weights[c];
+                sum.absolute[c] += part.absolute[c];
             }
-            (w, count)
+            sum
         })
-        .collect();
-    let counts = (0..channels).map(|c| lists[if alike { 0 } else { c }].1).collect();
-    (lists.into_iter().map(|l| l.0).collect(), counts)
+    }
+
+    /// Scale, normalisation and ε from the survey.
+    fn settle(&mut self, survey: &Survey, options: &FitOptions) -> Result<(), FitError> {
+        if survey.directions == 0 {
+            // Only a table comes here: the lists say themselves what is missing.
+            let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle: false, kind: None };
+            let reasons = sum::map_blocks(self.measurement.len(), |range| judge.list(range).1);
+            let mut left = Left::default();
+            reasons.iter().for_each(|r| left.add(r));
+            return Err(left.error(self.measurement, options.max_angle_deg));
+        }
+        let (largest, name) = (survey.largest, &self.measurement.name);
+        // The cost is reported in the data's unit squared.
+        if !(largest * largest * survey.directions as f64).is_finite() {
+            return Err(FitError::Overflow { name: name.clone(), largest });
+        }
+        self.count = survey.directions;
+        self.counts.clone_from(&survey.counts);
+        if self.loss.is_homogeneous() && largest > 0.0 {
+            // A multiple of three, so that the cube root of it is a power of two as well.
+            self.scale = (3.0 * (largest.log2() / 3.0).floor()).exp2();
+        }
+        let mean = |c: usize| if survey.weights[c] > 0.0 { survey.absolute[c] / survey.weights[c] } else { 0.0 };
+        self.epsilon = (0..self.channels.len()).map(|c| RELATIVE_EPSILON * mean(c) / self.scale).collect();
+        let factor = |c: usize| if survey.weights[c] > 0.0 { survey.counts[c] as f64 / survey.weights[c] } else { 0.0 };
+        let factors: Vec<f64> = (0..self.channels.len()).map(factor).collect();
+        self.lists = if survey.alike { 1 } else { self.channels.len() };
+        let unit = 1.0 / self.scale;
+        if let Source::Listed(all) = &mut self.source {
+            all.w.truncate(self.lists);
+            all.w.iter_mut().zip(&factors).for_each(|(w, f)| w.iter_mut().for_each(|w| *w *= f));
+            all.y.iter_mut().for_each(|y| y.iter_mut().for_each(|y| *y *= unit));
+        }
+        self.factor = factors;
+        Ok(())
+    }
+
+    /// All samples in one list, or those for which `keep` holds (by position among the samples).
+    pub fn listed(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut all = Block::default();
+        all.reset(self.lists, self.channels.len());
+        let (mut block, mut position) = (Block::default(), 0);
+        for b in 0..self.blocks() {
+            self.fill(b, &mut block);
+            for i in 0..block.len() {
+                if keep(position + i) {
+                    all.index.push(block.index[i]);
+                    all.cos_i.push(block.cos_i[i]);
+                    all.x.push(block.x[i]);
+                    let pairs = all.w.iter_mut().chain(&mut all.y).zip(block.w.iter().chain(&block.y));
+                    pairs.for_each(|(to, from)| to.push(from[i]));
+                }
+            }
+            position += block.len();
+        }
+        self.with(all)
+    }
+
+    /// These samples with every weight multiplied by `factor` (by position among the samples); the weights are not normalised again.
+    pub fn reweighted(&self, factor: impl Fn(usize) -> f64) -> Self {
+        let mut other = self.listed(|_| true);
+        if let Source::Listed(all) = &mut other.source {
+            for w in &mut all.w {
+                w.iter_mut().enumerate().for_each(|(i, w)| *w *= factor(i));
+            }
+        }
+        other
+    }
+
+    fn with(&self, all: Block) -> Self {
+        let weight = |c: usize| all.weight(c);
+        let counts = (0..self.channels.len()).map(|c| weight(c).iter().filter(|w| **w > 0.0).count()).collect();
+        Self {
+            measurement: self.measurement,
+            channels: self.channels.clone(),
+            loss: self.loss,
+            count: all.len(),
+            lists: self.lists,
+            factor: self.factor.clone(),
+            scale: self.scale,
+            counts,
+            epsilon: self.epsilon.clone(),
+            refused: self.refused,
+            weighting: self.weighting,
+            source: Source::Listed(all),
+        }
+    }
+
+    /// Runs of neighbouring samples within a block.
+    pub fn clusters(&self, block: &Block) -> Vec<Range<usize>> {
+        let step = if matches!(self.measurement.directions, Directions::Merl(_)) { BLOCK } else { CLUSTER };
+        (0..block.len()).step_by(step).map(|from| from..(from + step).min(block.len())).collect()
+    }
+
+    /// ∂r/∂f of a linear loss over a block, of one channel.
+    pub fn gain(&self, block: &Block, channel: usize) -> Vec<f64> {
+        match self.loss {
+            Loss::L2 => vec![1.0; block.len()],
+            Loss::Relative => block.y[channel].iter().map(|y| 1.0 / (y.abs() + self.epsilon[channel])).collect(),
+            Loss::CosineL2 | Loss::Log | Loss::CubeRoot => block.cos_i.clone(),
+        }
+    }
 }
 
-/// Coordinates of every lobe kind; each pair of directions is found once.
-fn coordinates(measurement: &Measurement, index: &[u32], kinds: &[LobeKind]) -> Vec<(LobeKind, Vec<f64>)> {
-    let blocks = sum::map_blocks(index.len(), |block| {
-        let mut lists = vec![Vec::with_capacity(block.len()); kinds.len()];
-        for &i in &index[block] {
-            let (wi, wo) = measurement.directions.pair(i as usize);
-            lists.iter_mut().zip(kinds).for_each(|(list, kind)| list.push(kind.lobe().coordinate(wi, wo)));
+fn least_cos(options: &FitOptions) -> f64 {
+    options.max_angle_deg.to_radians().cos() - INCLUSIVE
+}
+
+/// Decides entry by entry.
+struct Judge<'a> {
+    samples: &'a Samples<'a>,
+    options: &'a FitOptions,
+    least_cos: f64,
+    solid_angle: bool,
+    kind: Option<LobeKind>,
+}
+
+/// Entries left out, by reason.
+#[derive(Debug, Default)]
+struct Left {
+    entries: usize,
+    below: usize,
+    beyond: usize,
+    masked: usize,
+    weightless: usize,
+    /// Values, not entries, that the loss can't take.
+    refused: usize,
+}
+
+impl Left {
+    fn add(&mut self, other: &Self) {
+        self.entries += other.entries;
+        self.below += other.below;
+        self.beyond += other.beyond;
+        self.masked += other.masked;
+        self.weightless += other.weightless;
+        self.refused += other.refused;
+    }
+
+    fn error(&self, measurement: &Measurement, max_angle_deg: f64) -> FitError {
+        FitError::NothingToFit {
+            name: measurement.name.clone(),
+            entries: self.entries,
+            below: self.below,
+            beyond: self.beyond,
+            masked: self.masked,
+            weightless: self.weightless,
+            max_angle_deg,
         }
-        lists
-    });
-    let join = |k: usize| blocks.iter().flat_map(|lists| lists[k].iter().copied()).collect();
-    kinds.iter().enumerate().map(|(k, kind)| (*kind, join(k))).collect()
+    }
+}
+
+impl Judge<'_> {
+    /// The samples among these entries.
+    fn list(&self, range: Range<usize>) -> (Block, Left) {
+        let channels = self.samples.channels.len();
+        let (mut block, mut left) = (Block::default(), Left::default());
+        block.reset(channels, channels);
+        let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
+        for entry in range.filter(|e| e.is_multiple_of(self.options.stride)) {
+            left.entries += 1;
+            let (wi, wo) = self.samples.measurement.directions.pair(entry);
+            if !(wi.z > 0.0 && wo.z > 0.0) {
+                left.below += 1;
+            } else if wi.z < self.least_cos || wo.z < self.least_cos {
+                left.beyond += 1;
+            } else if !self.values(entry, wi.z, &mut w, &mut y, &mut left) {
+                left.masked += 1;
+            } else if w.iter().all(|w| *w <= 0.0) {
+                left.weightless += 1;
+            } else {
+                block.index.push(entry as u32);
+                block.cos_i.push(wi.z);
+                block.x.push(self.kind.map_or(0.0, |k| k.lobe().coordinate(wi, wo)));
+                block.w.iter_mut().zip(&w).for_each(|(list, w)| list.push(*w));
+                block.y.iter_mut().zip(&y).for_each(|(list, y)| list.push(*y));
+            }
+        }
+        (block, left)
+    }
+
+    /// Weights and values of an entry, channel by channel, 0 where masked; false where all are.
+    fn values(&self, entry: usize, cos_i: f64, w: &mut [f64], y: &mut [f64], left: &mut Left) -> bool {
+        let (samples, loss) = (self.samples, self.samples.loss);
+        let weight = if self.solid_angle && !self.options.use_sigma { samples.measurement.weights.get(entry) } else { 1.0 };
+        let mut any = false;
+        for (c, &channel) in samples.channels.iter().enumerate() {
+            (w[c], y[c]) = (0.0, 0.0);
+            let Some(value) = samples.measurement.value(channel, entry) else { continue };
+            let datum = Datum { value, cos_i, epsilon: 0.0 };
+            if !loss.accepts(datum) {
+                left.refused += 1;
+                continue;
+            }
+            any = true;
+            y[c] = value;
+            w[c] = weight * if self.options.use_sigma { self.inverse_variance(entry, channel, datum) } else { 1.0 };
+        }
+        any
+    }
+
+    /// 1/σ_r² with σ_r = |∂r/∂y| σ at f = y; 0 where σ is no positive number. The relative loss's ε is not known yet: the value alone stands for its
+    /// denominator.
+    fn inverse_variance(&self, entry: usize, channel: usize, datum: Datum) -> f64 {
+        let sigma = self.samples.measurement.sigma_plane(channel).map_or(f64::NAN, |s| s[entry]);
+        let sigma_r = sigma * self.samples.loss.data_slope(datum.value.max(0.0), datum);
+        if sigma > 0.0 && sigma_r > 0.0 && sigma_r.is_finite() { sigma_r.powi(-2) } else { 0.0 }
+    }
 }

@@ -1,113 +1,197 @@
-//! Starts without a guess: the reduced cost on a lattice of shapes one octave apart, from a single pass over the samples.
+//! The search without a start value: the cost on a lattice of shapes one octave apart, the promising nodes polished, and how sure one
+//! can be that the best of the minima found is the lowest there is.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use super::nnls;
 use super::options::FitError;
-use super::passes::{basis, dot};
-use super::samples::Samples;
-use super::solver::Linearize;
-use super::varpro::Profile;
-use crate::brdf::LobeKind;
-use crate::brdf::lobe::octave;
-use crate::numeric::sum::fold_blocks;
+use super::passes::ShapedLobe;
+use super::quadratic::{self, Feasible};
+use super::reduced::{Problem, Search, Streamed};
+use super::solver::{self, Linearize, Outcome};
+use crate::numeric::random::{Purpose, RngExt, stream};
 
-/// Starts polished at most.
-const MOST_STARTS: usize = 3;
-/// Lattice combinations kept while lobes are added one by one.
+/// Combinations of nodes kept while lobes are added one by one.
 const BEAM: usize = 24;
+/// Lattice starts polished at most.
+const MOST_STARTS: usize = 8;
+/// Starts drawn at random on top, for models with several lobes.
+const RANDOM_STARTS: usize = 24;
+/// Costs that differ by less than this share belong to one minimum.
+const SAME: f64 = 1e-9;
 
-/// Starts for the solver, the most promising first. One empty start where there is nothing to search.
-///
-/// Every lobe of the model with a shape has one shape parameter and they are of one kind (the closed set of lobes sees to it),
-/// so one lattice serves all of them.
-pub(super) fn starts(problem: &Profile<'_>) -> Vec<Vec<f64>> {
-    match problem.layout.len() {
-        0 => vec![Vec::new()],
-        1 => single(problem),
-        many => several(problem, many),
-    }
+/// How the global minimum was looked for.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SearchReport {
+    /// Starts polished.
+    pub starts: usize,
+    /// Of them, how many ended in the lowest minimum.
+    pub reached: usize,
+    /// Distinct minima seen.
+    pub minima: usize,
+    /// Cost of the second lowest minimum over the lowest's, less 1.
+    pub runner_up_excess: Option<f64>,
+    /// Chance that one more random start would find a minimum not seen before (Boender & Rinnooy Kan 1987); none where the lattice itself
+    /// brackets the minima of the one shape.
+    pub unseen: Option<f64>,
 }
 
-/// A smaller model's optimum with one lobe more, where that lobe helps most among shapes an octave apart.
-pub(super) fn extended(problem: &Profile<'_>, smaller: &DVector<f64>) -> Result<Vec<f64>, FitError> {
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for node in nodes(problem) {
-        let t = smaller.push(node.ln());
-        let cost = problem.cost(&t).map_err(|e| FitError::Solver { reason: e.to_string() })?;
-        if best.as_ref().is_none_or(|(lowest, _)| cost < *lowest) {
-            best = Some((cost, t.as_slice().to_vec()));
-        }
-    }
-    best.map(|(_, t)| t).ok_or_else(|| FitError::Solver { reason: "no start".into() })
+/// The lowest minimum, and how it was found.
+#[derive(Debug)]
+pub(super) struct Found {
+    pub outcome: Outcome,
+    pub report: SearchReport,
 }
 
-/// Shapes an octave apart over the range that is searched.
-fn nodes(problem: &Profile<'_>) -> Vec<f64> {
-    let (low, high) = problem.layout[0].1.bounds;
-    let octaves = (high / low).log2().floor() as usize + 1;
-    (0..octaves).map(|k| octave(low, k)).collect()
-}
-
-/// Sums over the lattice: column 0 … base−1 the lobes without a shape, then one column a node, then one slope a node.
-struct Lattice {
-    /// ln(shape) at the nodes.
+/// Where lobes of one problem may stand: nodes an octave apart within the bounds of each t.
+struct Nodes {
+    /// All distinct t, ascending.
     t: Vec<f64>,
-    base: usize,
-    gram: Vec<DMatrix<f64>>,
-    data: Vec<DVector<f64>>,
-    energy: f64,
+    /// Of each parameter, its nodes as indices into `t`.
+    of: Vec<Vec<usize>>,
+    /// Whether all parameters share the same nodes, so that only ascending combinations count.
+    alike: bool,
 }
 
-impl Lattice {
-    fn node(&self, k: usize) -> usize {
-        self.base + k
-    }
-
-    fn slope(&self, k: usize) -> usize {
-        self.base + self.t.len() + k
-    }
-
-    fn gram(&self, channel: usize) -> &DMatrix<f64> {
-        if self.gram.len() == 1 { &self.gram[0] } else { &self.gram[channel] }
-    }
-
-    /// Reduced cost with the lobes at these nodes, and the weights of each channel.
-    fn cost(&self, nodes: &[usize]) -> (f64, Vec<DVector<f64>>) {
-        let columns: Vec<usize> = (0..self.base).chain(nodes.iter().map(|&k| self.node(k))).collect();
-        let mut cost = self.energy;
-        let weights = (0..self.data.len())
-            .map(|c| {
-                let b = self.data[c].select_rows(&columns);
-                let x = nnls::solve(&self.gram(c).select_rows(&columns).select_columns(&columns), &b);
-                cost -= b.dot(&x);
-                x
-            })
-            .collect();
-        (cost, weights)
-    }
-
-    /// dC/dt of the one-lobe cost at node `k`.
-    fn derivative(&self, k: usize, weights: &[DVector<f64>]) -> f64 {
-        let along = |c: usize, x: &DVector<f64>| {
-            let gram = self.gram(c);
-            let model: f64 = (0..self.base).map(|l| x[l] * gram[(self.slope(k), l)]).sum::<f64>()
-                + x[self.base] * gram[(self.slope(k), self.node(k))];
-            2.0 * x[self.base] * (model - self.data[c][self.slope(k)])
+impl Nodes {
+    fn new(problem: &Problem<'_>) -> Self {
+        let octaves = |(low, high): (f64, f64)| {
+            let count = ((high - low) / std::f64::consts::LN_2 + 1e-9).floor() as usize;
+            (0..=count).map(|k| low + k as f64 * std::f64::consts::LN_2).collect::<Vec<f64>>()
         };
-        weights.iter().enumerate().map(|(c, x)| along(c, x)).sum()
+        let lists: Vec<Vec<f64>> = problem.bounds.iter().map(|b| octaves(*b)).collect();
+        let mut t: Vec<f64> = lists.iter().flatten().copied().collect();
+        t.sort_by(f64::total_cmp);
+        t.dedup();
+        let index = |x: &f64| t.partition_point(|y| y < x);
+        let of = lists.iter().map(|list| list.iter().map(index).collect()).collect();
+        Self { of, t, alike: problem.bounds.windows(2).all(|b| b[0] == b[1]) }
+    }
+
+    /// The best combinations, found by adding one lobe at a time and keeping the best few.
+    fn combinations(&self, cost: impl Fn(&[usize]) -> f64 + Sync) -> Vec<Vec<f64>> {
+        let mut beam: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
+        for own in &self.of {
+            let mut sets: Vec<Vec<usize>> = Vec::new();
+            for (_, before) in &beam {
+                for &k in own.iter().filter(|k| !before.contains(k)) {
+                    let mut set = before.clone();
+                    set.push(k);
+                    if self.alike {
+                        set.sort_unstable();
+                    }
+                    sets.push(set);
+                }
+            }
+            sets.sort_unstable();
+            sets.dedup();
+            // Pairs are tried in full.
+            let keep = if beam[0].1.is_empty() { usize::MAX } else { BEAM };
+            let mut next: Vec<(f64, Vec<usize>)> = sets.into_par_iter().map(|set| (cost(&set), set)).collect();
+            next.sort_by(|a, b| a.0.total_cmp(&b.0));
+            next.truncate(keep);
+            beam = next;
+        }
+        beam.into_iter().take(MOST_STARTS).map(|(_, set)| set.iter().map(|&k| self.t[k]).collect()).collect()
     }
 }
 
-/// Every bracketed minimum of the one-lobe cost, and the ends where it falls outwards.
-fn single(problem: &Profile<'_>) -> Vec<Vec<f64>> {
-    let lattice = tabulate(problem, false);
-    let nodes: Vec<(f64, f64, f64)> = (0..lattice.t.len())
-        .map(|k| {
-            let (cost, weights) = lattice.cost(&[k]);
-            (lattice.t[k], cost, lattice.derivative(k, &weights))
-        })
-        .collect();
+/// The lowest minimum of a problem that the transforms know.
+pub(super) fn search(search: &Search<'_>, steps: u64) -> Result<Found, FitError> {
+    let problem = search.problem;
+    let mut starts = match problem.layout.len() {
+        0 => vec![Vec::new()],
+        1 => bracketed(search),
+        _ => {
+            let nodes = Nodes::new(problem);
+            let lattice = Lattice::new(search, &nodes.t);
+            nodes.combinations(|set| lattice.cost(problem, set))
+        }
+    };
+    let lattice = starts.len();
+    if problem.layout.len() > 1 {
+        starts.extend(drawn(problem, RANDOM_STARTS));
+    }
+    let run = |start: &Vec<f64>| polish_start(search, problem, start.clone(), steps);
+    let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
+    best_of(outcomes, lattice)
+}
+
+/// The lowest minimum of a problem that takes passes over its samples.
+pub(super) fn search_streamed(problem: &Problem<'_>, steps: u64) -> Result<Found, FitError> {
+    let starts = if problem.layout.is_empty() {
+        vec![Vec::new()]
+    } else {
+        let nodes = Nodes::new(problem);
+        let cost = |set: &[usize]| {
+            let part = problem.with_shapes(set.len());
+            let t: Vec<f64> = set.iter().map(|&k| nodes.t[k]).collect();
+            Streamed::new(&part).solve(&t).cost
+        };
+        let mut best = nodes.combinations(cost);
+        best.truncate(if problem.layout.len() == 1 { 3 } else { 4 });
+        best
+    };
+    let lattice = starts.len();
+    let run = |start: &Vec<f64>| polish_start(&Streamed::new(problem), problem, start.clone(), steps);
+    let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
+    best_of(outcomes, lattice)
+}
+
+fn polish_start(at: impl Linearize, problem: &Problem<'_>, start: Vec<f64>, steps: u64) -> Result<Outcome, FitError> {
+    let lm = solver::LevenbergMarquardt::bounded(problem.bounds.clone());
+    solver::minimize(at, lm, DVector::from_vec(start), steps).map_err(|e| FitError::Solver { reason: e.to_string() })
+}
+
+/// Shapes drawn evenly on the logarithmic scale.
+fn drawn(problem: &Problem<'_>, count: usize) -> Vec<Vec<f64>> {
+    let mut rng = stream(0, Purpose::Study, problem.layout.len() as u64);
+    let mut draw = |(low, high): &(f64, f64)| low + (high - low) * rng.random::<f64>();
+    (0..count).map(|_| problem.bounds.iter().map(&mut draw).collect()).collect()
+}
+
+/// Which of the `step` samples of run `run` a thinned-out list keeps: spread evenly, without a beat with the grid's own period.
+pub(super) fn offset(run: usize, step: usize) -> usize {
+    let golden = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+    (golden * step as u64 >> 32) as usize
+}
+
+fn best_of(outcomes: Vec<Outcome>, lattice: usize) -> Result<Found, FitError> {
+    let lowest = outcomes.iter().map(|o| o.cost).fold(f64::INFINITY, f64::min);
+    let same = |a: f64, b: f64| a <= b * (1.0 + SAME) + f64::MIN_POSITIVE;
+    let mut costs: Vec<f64> = outcomes.iter().map(|o| o.cost).collect();
+    costs.sort_by(f64::total_cmp);
+    let reached = costs.iter().filter(|c| same(**c, lowest)).count();
+    costs.dedup_by(|b, a| same(*b, *a));
+    let drawn = outcomes.len() - lattice;
+    let mut seen: Vec<f64> = outcomes[lattice..].iter().map(|o| o.cost).collect();
+    seen.sort_by(f64::total_cmp);
+    seen.dedup_by(|b, a| same(*b, *a));
+    let unseen = (drawn > 1).then(|| {
+        let (w, n) = (seen.len() as f64, drawn as f64);
+        (w * (w + 1.0) / (n * (n - 1.0))).min(1.0)
+    });
+    let report = SearchReport {
+        starts: outcomes.len(),
+        reached,
+        minima: costs.len(),
+        runner_up_excess: costs.get(1).filter(|_| lowest > 0.0).map(|c| c / lowest - 1.0),
+        unseen,
+    };
+    let outcome = outcomes.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+    outcome.map(|outcome| Found { outcome, report }).ok_or_else(|| FitError::Solver { reason: "no start".into() })
+}
+
+/// Every bracketed minimum of the one-shape cost, and the ends where it falls outwards.
+fn bracketed(search: &Search<'_>) -> Vec<Vec<f64>> {
+    let nodes = Nodes::new(search.problem).t;
+    let evaluate = |t: &f64| -> (f64, f64, f64) {
+        let at = search.linearize(&DVector::from_element(1, *t));
+        let slope = |l: solver::Linearization| (l.cost, 2.0 * (l.factor.transpose() * l.rhs)[0]);
+        let (cost, slope) = at.map_or((f64::NAN, f64::NAN), slope);
+        (*t, cost, slope)
+    };
+    let nodes: Vec<(f64, f64, f64)> = nodes.par_iter().map(evaluate).collect();
     let mut found: Vec<(f64, f64)> = nodes.windows(2).filter_map(|pair| hermite_minimum(pair[0], pair[1])).collect();
     if let (Some(&(t0, c0, d0)), Some(&(t1, c1, d1))) = (nodes.first(), nodes.last()) {
         found.extend((d0 > 0.0).then_some((c0, t0)));
@@ -116,11 +200,10 @@ fn single(problem: &Profile<'_>) -> Vec<Vec<f64>> {
     // A node below both neighbours whose slopes don't show it (rounding), or a flat cost: the lowest node serves.
     let lowest = nodes.iter().map(|&(t, c, _)| (c, t)).min_by(|a, b| a.0.total_cmp(&b.0));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((cost, t)) = lowest {
-        found.retain(|f| f.0 <= cost);
-        if found.is_empty() {
-            found.push((cost, t));
-        }
+    if let Some((cost, t)) = lowest
+        && found.first().is_none_or(|f| f.0 > cost)
+    {
+        found.insert(0, (cost, t));
     }
     found.into_iter().take(MOST_STARTS).map(|(_, t)| vec![t]).collect()
 }
@@ -140,104 +223,42 @@ fn hermite_minimum(a: (f64, f64, f64), b: (f64, f64, f64)) -> Option<(f64, f64)>
     Some((a.1 + s * (m0 + s * (q + s * p)), a.0 + s * h))
 }
 
-/// The best combinations of nodes for several lobes, found by adding one at a time and keeping the best few.
-fn several(problem: &Profile<'_>, lobes: usize) -> Vec<Vec<f64>> {
-    let lattice = tabulate(problem, true);
-    let mut beam: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
-    for _ in 0..lobes {
-        let mut next: Vec<(f64, Vec<usize>)> = Vec::new();
-        for (_, nodes) in &beam {
-            for k in (0..lattice.t.len()).filter(|k| !nodes.contains(k)) {
-                let mut set = nodes.clone();
-                set.push(k);
-                set.sort_unstable();
-                if next.iter().all(|(_, other)| *other != set) {
-                    next.push((lattice.cost(&set).0, set));
-                }
-            }
+/// Sums over all pairs of nodes: column 0 … base−1 the lobes without a shape, then one column a node.
+struct Lattice {
+    base: Vec<usize>,
+    shaped: Vec<usize>,
+    gram: Vec<DMatrix<f64>>,
+    data: Vec<DVector<f64>>,
+    energy: f64,
+}
+
+impl Lattice {
+    fn new(search: &Search<'_>, t: &[f64]) -> Self {
+        let problem = search.problem;
+        let (shaped, base): (Vec<usize>, Vec<usize>) =
+            (0..problem.kinds.len()).partition(|&l| !problem.kinds[l].lobe().parameters().is_empty());
+        // The closed set of lobes sees to it that the shaped ones of a model are of one kind.
+        let kind = problem.kinds[shaped[0]];
+        let plain = base.iter().map(|&l| ShapedLobe { kind: problem.kinds[l], shape: Vec::new() });
+        let lobes: Vec<ShapedLobe> =
+            plain.chain(t.iter().map(|t| ShapedLobe { kind, shape: vec![t.exp()] })).collect();
+        let moments = search.moments(&lobes, false);
+        Self { base, shaped, gram: moments.gram, data: moments.data, energy: search.energy.iter().sum() }
+    }
+
+    /// Reduced cost with the first shaped lobes at these nodes, the others absent.
+    fn cost(&self, problem: &Problem<'_>, nodes: &[usize]) -> f64 {
+        let columns: Vec<usize> = (0..self.base.len()).chain(nodes.iter().map(|&k| self.base.len() + k)).collect();
+        let lobes = self.base.iter().chain(&self.shaped[..nodes.len()]);
+        let mut cost = self.energy;
+        for (c, data) in self.data.iter().enumerate() {
+            let ranges: Vec<(f64, f64)> = lobes.clone().map(|&l| problem.ranges[c][l]).collect();
+            let gram = &self.gram[if self.gram.len() == 1 { 0 } else { c }];
+            let gram = gram.select_rows(&columns).select_columns(&columns);
+            let b = data.select_rows(&columns);
+            let x = quadratic::minimise(&gram, &b, &Feasible { ranges: &ranges, cap: problem.cap });
+            cost += x.dot(&(gram * &x)) - 2.0 * x.dot(&b);
         }
-        next.sort_by(|a, b| a.0.total_cmp(&b.0));
-        next.truncate(BEAM);
-        beam = next;
-    }
-    beam.into_iter().take(MOST_STARTS).map(|(_, nodes)| nodes.iter().map(|&k| lattice.t[k]).collect()).collect()
-}
-
-/// One pass over the samples for the whole lattice; `pairs` also sums products of different nodes.
-fn tabulate(problem: &Profile<'_>, pairs: bool) -> Lattice {
-    let low = problem.layout[0].1.bounds.0;
-    let t: Vec<f64> = nodes(problem).into_iter().map(f64::ln).collect();
-    let plain: Vec<_> = problem.kinds.iter().filter(|k| k.lobe().parameters().is_empty()).copied().collect();
-    let shaped = problem.kinds[problem.layout[0].0];
-    let samples = problem.samples;
-    let width = plain.len() + t.len() * if pairs { 1 } else { 2 };
-    let zero = (
-        vec![DMatrix::<f64>::zeros(width, width); samples.weight_lists()],
-        vec![DVector::<f64>::zeros(width); samples.data.len()],
-        0.0,
-    );
-    let (gram, data, energy) = fold_blocks(
-        samples.len(),
-        zero.clone(),
-        |block| {
-            let columns = lattice_columns(samples, &plain, (shaped, low, t.len()), !pairs, block.clone());
-            let (mut gram, mut data, mut energy) = zero.clone();
-            let g = &samples.slope[block.clone()];
-            for c in 0..samples.data.len() {
-                let w = &samples.weight(c)[block.clone()];
-                let wg: Vec<f64> = w.iter().zip(g).map(|(w, g)| w * g * g).collect();
-                let y = &samples.data[c][block.clone()];
-                let wy: Vec<f64> = wg.iter().zip(y).map(|(w, y)| w * y).collect();
-                energy += dot(&wy, y);
-                for (a, column) in columns.iter().enumerate() {
-                    data[c][a] = dot(&wy, column);
-                }
-                if c < samples.weight_lists() {
-                    fill_gram(&mut gram[c], &columns, &wg, plain.len(), t.len(), pairs);
-                }
-            }
-            (gram, data, energy)
-        },
-        |total, part| {
-            total.0.iter_mut().zip(&part.0).for_each(|(t, p)| *t += p);
-            total.1.iter_mut().zip(&part.1).for_each(|(t, p)| *t += p);
-            total.2 += part.2;
-        },
-    );
-    Lattice { t, base: plain.len(), gram, data, energy }
-}
-
-/// Columns of one block: the lobes without a shape, the nodes of `shaped` (lobe, first shape, octaves), their slopes.
-fn lattice_columns(
-    samples: &Samples,
-    plain: &[LobeKind],
-    shaped: (LobeKind, f64, usize),
-    slopes: bool,
-    block: std::ops::Range<usize>,
-) -> Vec<Vec<f64>> {
-    let (kind, low, octaves) = shaped;
-    let mut columns: Vec<Vec<f64>> = plain.iter().map(|kind| basis(samples, *kind, &[], block.clone()).0).collect();
-    let (values, mut derivatives) = kind.lobe().fill_octaves(low, octaves, &samples.coordinate(kind)[block]);
-    columns.extend(values);
-    for (k, list) in derivatives.iter_mut().enumerate() {
-        list.iter_mut().for_each(|d| *d *= octave(low, k));
-    }
-    if slopes {
-        columns.extend(derivatives);
-    }
-    columns
-}
-
-/// The products that are asked of the lattice, as a symmetric matrix with zeros elsewhere.
-fn fill_gram(gram: &mut DMatrix<f64>, columns: &[Vec<f64>], wg: &[f64], base: usize, nodes: usize, pairs: bool) {
-    for a in 0..columns.len() {
-        let weighted: Vec<f64> = wg.iter().zip(&columns[a]).map(|(w, x)| w * x).collect();
-        for b in 0..=a {
-            let same_node = b >= base && (a - base) % nodes == (b - base) % nodes;
-            if b < base || same_node || pairs {
-                gram[(a, b)] = dot(&weighted, &columns[b]);
-                gram[(b, a)] = gram[(a, b)];
-            }
-        }
+        cost
     }
 }

@@ -6,5 +6,6 @@
 pub mod float;
 pub mod quadrature;
 pub mod random;
+pub mod simd;
 pub mod stats;
 pub mod sum;
