@@ -4,9 +4,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::loss::Datum;
-use super::passes::{Columns, Residuals, Weighted};
+use super::passes::{Moments, Projected, Scratch};
 use super::reduced::{Problem, Solution};
-use super::samples::Block;
+use super::samples::{Block, PIECES};
 use super::structure::Neighbours;
 use crate::numeric::simd::{Kernel, dot, vectorised};
 use crate::numeric::stats::student_quantile;
@@ -45,7 +45,10 @@ const INVOLVED: f64 = 1e-8;
 struct ChannelSums {
     cost: f64,
     normal: DMatrix<f64>,
+    /// B of the values without a stated σ, before the factor N/(N − p).
     spread: DMatrix<f64>,
+    /// B of the values with one.
+    known: DMatrix<f64>,
     common: Vec<DVector<f64>>,
     /// Whether a sample lies where the lobes with a shape are 0 whatever it is.
     dark: bool,
@@ -53,23 +56,25 @@ struct ChannelSums {
     neighbours: Neighbours,
 }
 
-/// What one block adds.
+/// What a piece of the samples adds.
 struct Part {
     channels: Vec<ChannelSums>,
     /// Σ over clusters of neighbours of the outer product of their pull on the parameters.
     clusters: DMatrix<f64>,
     count: usize,
+    scratch: Scratch,
 }
 
-/// Standard errors at a solution.
-pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution) -> Uncertainty {
+/// Standard errors at a solution. `moments` are the sums of A where they are known.
+pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<&Moments>) -> Uncertainty {
     let samples = problem.samples;
     let (channels, lobes, shapes) = (at.weights.len(), problem.kinds.len(), problem.layout.len());
     let n = samples.residuals();
     let parameters = channels * lobes + shapes;
     let freedom = n as f64 - parameters as f64;
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
-    let parts = samples.map_blocks(|block| part(problem, at, block, inflation));
+    let start = || Part::new(problem, at);
+    let parts = samples.map_pieces(PIECES, start, |part, block| part.add(problem, at, block, moments.is_none()));
 
     let (mut normal, mut spread) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
     let mut clusters = DMatrix::zeros(parameters, parameters);
@@ -80,18 +85,30 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution) -> Uncertainty {
         clusters += &part.clusters;
         count += part.count;
         for (c, sums) in part.channels.iter().enumerate() {
-            let place: Vec<usize> = (c * lobes..(c + 1) * lobes).chain(channels * lobes..parameters).collect();
+            let strength = strength(problem, &at.weights[c]);
+            let place = place(problem, channels, c);
             for (i, &a) in place.iter().enumerate() {
                 for (j, &b) in place.iter().enumerate() {
-                    normal[(a, b)] += sums.normal[(i.max(j), i.min(j))];
-                    spread[(a, b)] += sums.spread[(i.max(j), i.min(j))];
+                    let both = strength[i] * strength[j];
+                    normal[(a, b)] += both * sums.normal[(i.max(j), i.min(j))];
+                    spread[(a, b)] += both * (sums.known[(i.max(j), i.min(j))] + inflation * sums.spread[(i.max(j), i.min(j))]);
                 }
-                common.iter_mut().zip(&sums.common).for_each(|(total, part)| total[a] += part[i]);
+                common.iter_mut().zip(&sums.common).for_each(|(total, part)| total[a] += strength[i] * part[i]);
             }
             cost += sums.cost;
             stated = (stated.0 + sums.stated.0, stated.1 + sums.stated.1);
             neighbours.add(&sums.neighbours);
             dark[c] |= sums.dark;
+        }
+    }
+    if let Some(moments) = moments {
+        for (c, x) in at.weights.iter().enumerate() {
+            let (strength, place) = (strength(problem, x), place(problem, channels, c));
+            for (i, &a) in place.iter().enumerate() {
+                place.iter().enumerate().for_each(|(j, &b)| {
+                    normal[(a, b)] += strength[i] * strength[j] * moments.gram(c)[(i, j)];
+                });
+            }
         }
     }
     let sandwich = Sandwich::new(&normal);
@@ -111,6 +128,18 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution) -> Uncertainty {
         stated,
         quantile: student_quantile(0.975, freedom.max(1.0)),
     }
+}
+
+/// What the bare columns of a channel are multiplied by: 1 for the lobes themselves, the lobe's weight for its slopes.
+fn strength(problem: &Problem<'_>, x: &DVector<f64>) -> Vec<f64> {
+    std::iter::repeat_n(1.0, x.len()).chain(problem.layout.iter().map(|(lobe, _)| x[*lobe])).collect()
+}
+
+/// Where a channel's columns stand among all parameters.
+fn place(problem: &Problem<'_>, channels: usize, channel: usize) -> Vec<usize> {
+    let lobes = problem.kinds.len();
+    let shapes = channels * lobes..channels * lobes + problem.layout.len();
+    (channel * lobes..(channel + 1) * lobes).chain(shapes).collect()
 }
 
 /// Parameters that a lobe at n → 0 shares with the diffuse lobe. A Phong lobe of exponent 0 is diffuse on all samples where it is not 0; where
@@ -183,33 +212,52 @@ impl Sandwich {
     }
 }
 
-/// All sums over one block.
-fn part(problem: &Problem<'_>, at: &Solution, block: &Block, inflation: f64) -> Part {
-    let (channels, lobes) = (at.weights.len(), problem.kinds.len());
-    let parameters = channels * lobes + problem.layout.len();
-    let basis = Columns::fill(block, &at.lobes);
-    let pairs = Neighbours::pairs(problem.samples.measurement, block);
-    let clusters: Vec<std::ops::Range<usize>> = problem.samples.clusters(block);
-    let mut scores = vec![DVector::<f64>::zeros(parameters); clusters.len()];
-    let mut all = Vec::new();
-    for (c, x) in at.weights.iter().enumerate() {
-        let f = basis.model(x);
-        let residuals = Residuals::at(problem.samples, block, c, &f, problem.saturation);
-        let mut columns = basis.all.clone();
-        for (column, (lobe, _)) in columns[lobes..].iter_mut().zip(&problem.layout) {
-            column.iter_mut().for_each(|s| *s *= x[*lobe]);
-        }
-        for (score, cluster) in scores.iter_mut().zip(&clusters) {
-            for (i, column) in columns.iter().enumerate() {
-                let place = if i < lobes { c * lobes + i } else { channels * lobes + i - lobes };
-                score[place] += vectorised(Dot(&residuals.pull[cluster.clone()], &column[cluster.clone()]));
+impl Part {
+    fn new(problem: &Problem<'_>, at: &Solution) -> Self {
+        let (channels, k) = (at.weights.len(), problem.kinds.len() + problem.layout.len());
+        let parameters = channels * problem.kinds.len() + problem.layout.len();
+        let sums = ChannelSums {
+            cost: 0.0,
+            normal: DMatrix::zeros(k, k),
+            spread: DMatrix::zeros(k, k),
+            known: DMatrix::zeros(k, k),
+            common: vec![DVector::zeros(k); problem.samples.measurement.common.len()],
+            dark: false,
+            stated: (0.0, 0),
+            neighbours: Neighbours::default(),
+        };
+        let clusters = DMatrix::zeros(parameters, parameters);
+        Self { channels: vec![sums; channels], clusters, count: 0, scratch: Scratch::default() }
+    }
+
+    /// Adds all sums over one block; `bread` says whether A is among them.
+    fn add(&mut self, problem: &Problem<'_>, at: &Solution, block: &Block, bread: bool) {
+        let channels = at.weights.len();
+        self.scratch.basis(block, &at.lobes);
+        let clusters: Vec<std::ops::Range<usize>> = problem.samples.clusters(block);
+        let mut scores = vec![DVector::<f64>::zeros(self.clusters.nrows()); clusters.len()];
+        for (c, x) in at.weights.iter().enumerate() {
+            let (scratch, sums) = (&mut self.scratch, &mut self.channels[c]);
+            sums.cost += scratch.residuals(problem.samples, block, c, x, problem.saturation);
+            let (w, pairs) = (block.weight(c), &block.pairs);
+            sums.neighbours.add(&Neighbours::of(&scratch.r, &scratch.trust, w, pairs));
+            sums.dark |= vectorised(Dark(&block.x, w)) > 0.0;
+            let gradient = sums.add(problem, block, c, scratch, bread);
+            let (strength, place) = (strength(problem, x), place(problem, channels, c));
+            if clusters.len() == 1 {
+                place.iter().enumerate().for_each(|(i, p)| scores[0][*p] += strength[i] * gradient[i]);
+                continue;
+            }
+            for (score, cluster) in scores.iter_mut().zip(&clusters) {
+                for (i, column) in scratch.columns.iter().enumerate() {
+                    let sum = vectorised(Dot(&scratch.pull[cluster.clone()], &column[cluster.clone()]));
+                    score[place[i]] += strength[i] * sum;
+                }
             }
         }
-        all.push(channel_sums(problem, block, c, &f, &residuals, &columns, inflation, &pairs));
+        scores.iter().for_each(|s| self.clusters.ger(1.0, s, s, 1.0));
+        self.count += clusters.len();
     }
-    let mut sum = DMatrix::zeros(parameters, parameters);
-    scores.iter().for_each(|s| sum.ger(1.0, s, s, 1.0));
-    Part { channels: all, clusters: sum, count: clusters.len() }
 }
 
 struct Dot<'a>(&'a [f64], &'a [f64]);
@@ -223,69 +271,115 @@ impl Kernel for Dot<'_> {
     }
 }
 
-/// A, B and the g_k of one channel. v is σ_r² where σ is known, else r² N/(N − p); under a robust loss always the latter, for a stated σ says nothing
-/// of outliers.
-#[allow(clippy::too_many_arguments)] // the parts of one sum
-fn channel_sums(
-    problem: &Problem<'_>,
-    block: &Block,
-    channel: usize,
-    f: &[f64],
-    residuals: &Residuals,
-    columns: &[Vec<f64>],
-    inflation: f64,
-    pairs: &[bool],
-) -> ChannelSums {
+/// Σ w where the lobes with a shape are 0.
+struct Dark<'a>(&'a [f64], &'a [f64]);
+
+impl Kernel for Dark<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let ((x8, rest_x), (w8, rest_w)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
+        let mut lanes = [0.0f64; 8];
+        let dark = |x: f64, w: f64| if x == f64::NEG_INFINITY { w } else { 0.0 };
+        for (x, w) in x8.iter().zip(w8) {
+            for k in 0..8 {
+                lanes[k] += dark(x[k], w[k]);
+            }
+        }
+        lanes.iter().sum::<f64>() + rest_x.iter().zip(rest_w).map(|(x, w)| dark(*x, *w)).sum::<f64>()
+    }
+}
+
+impl ChannelSums {
+    /// Adds A, B and the g_k over a block, of the bare columns, and returns Σ pull·col. v is σ_r² where σ is known, else r²; under a robust loss
+    /// always the latter, for a stated σ says nothing of outliers.
+    fn add(
+        &mut self,
+        problem: &Problem<'_>,
+        block: &Block,
+        channel: usize,
+        scratch: &mut Scratch,
+        bread: bool,
+    ) -> DVector<f64> {
+        let measurement = problem.samples.measurement;
+        let own = problem.samples.channels[channel];
+        let (k, w) = (scratch.columns.len(), block.weight(channel));
+        let mut gradient = DVector::zeros(k);
+        if bread {
+            scratch.curvature(w);
+            if let Some((kind, s)) = problem.saturation {
+                // How the pull itself grows with the residual.
+                let growth = |i: usize| w[i] * scratch.slope[i].powi(2) * kind.rho((scratch.r[i] / s).powi(2)).2;
+                scratch.weight = (0..w.len()).map(growth).collect();
+            }
+            scratch.tally(k, &mut gradient, &mut self.normal);
+            gradient.fill(0.0);
+        }
+        let data_slopes = data_slopes(problem, block, channel, &scratch.f);
+        scratch.weight.resize(w.len(), 0.0);
+        vectorised(Square(&scratch.pull, &mut scratch.weight));
+        if let Some(sigma) = measurement.sigma_plane(own) {
+            let known = self.stated(block, w, &data_slopes, sigma);
+            if problem.saturation.is_none() {
+                let mut rest = std::mem::take(&mut scratch.weight);
+                let spread = |(i, s): (usize, &Option<f64>)| s.map_or(0.0, |s| (w[i] * scratch.slope[i] * s).powi(2));
+                scratch.weight = known.iter().enumerate().map(spread).collect();
+                scratch.tally(k, &mut gradient, &mut self.known);
+                rest.iter_mut().zip(&known).filter(|(_, s)| s.is_some()).for_each(|(v, _)| *v = 0.0);
+                scratch.weight = rest;
+                gradient.fill(0.0);
+            }
+        }
+        scratch.tally(k, &mut gradient, &mut self.spread);
+        for (component, total) in self.common.iter_mut().enumerate() {
+            let u = measurement.common_plane(component, own);
+            let trust = |i: usize| scratch.trust.get(i).copied().unwrap_or(1.0);
+            let moved = |i: usize| {
+                let shift = u[block.index[i] as usize];
+                if shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * data_slopes[i] * shift } else { 0.0 }
+            };
+            let moved: Vec<f64> = (0..block.len()).map(moved).collect();
+            vectorised(Projected { columns: &scratch.columns, on: &moved, into: total.as_mut_slice() });
+        }
+        gradient
+    }
+
+    /// σ_r of every value that states its σ.
+    fn stated(&mut self, block: &Block, w: &[f64], data_slopes: &[f64], sigma: &[f64]) -> Vec<Option<f64>> {
+        let of = |i: usize| {
+            let s = data_slopes[i] * sigma[block.index[i] as usize];
+            (s.is_finite() && w[i] > 0.0).then_some(s)
+        };
+        let known: Vec<Option<f64>> = (0..block.len()).map(of).collect();
+        for (s, w) in known.iter().zip(w) {
+            self.stated.0 += s.map_or(0.0, |s| w * s * s);
+            self.stated.1 += usize::from(s.is_some());
+        }
+        known
+    }
+}
+
+struct Square<'a>(&'a [f64], &'a mut [f64]);
+
+impl Kernel for Square<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.1.iter_mut().zip(self.0).for_each(|(to, v)| *to = v * v);
+    }
+}
+
+/// |∂r/∂y| in the fit's scale, for errors in the data's own unit; empty where the measurement states none.
+fn data_slopes(problem: &Problem<'_>, block: &Block, channel: usize, f: &[f64]) -> Vec<f64> {
     let samples = problem.samples;
-    let measurement = samples.measurement;
-    let own = samples.channels[channel];
-    let (k, n) = (columns.len(), block.len());
-    let w = block.weight(channel);
-    let sigma = measurement.sigma_plane(own);
-    // |∂r/∂y| in the fit's scale, for errors in the data's own unit.
-    let data_slope = |i: usize| {
+    if samples.measurement.sigma.is_none() && samples.measurement.common.is_empty() {
+        return Vec::new();
+    }
+    let slope = |i: usize| {
         let datum = Datum { value: block.y[channel][i], cos_i: block.cos_i[i], epsilon: samples.epsilon[channel] };
         samples.loss.data_slope(f[i], datum) / samples.scale
     };
-    let needs_slopes = sigma.is_some() || !measurement.common.is_empty();
-    let data_slopes: Vec<f64> = if needs_slopes { (0..n).map(data_slope).collect() } else { Vec::new() };
-    let mut stated = (0.0, 0);
-    let mut bread = residuals.curvature.clone();
-    if let Some((kind, s)) = problem.saturation {
-        let growth = |i: usize| w[i] * residuals.slope[i].powi(2) * kind.rho((residuals.r[i] / s).powi(2)).2;
-        bread.iter_mut().enumerate().for_each(|(i, b)| *b = growth(i));
-    }
-    let mut variance: Vec<f64> = residuals.pull.iter().map(|p| p * p * inflation).collect();
-    if let Some(sigma) = sigma {
-        for i in 0..n {
-            let s = data_slopes[i] * sigma[block.index[i] as usize];
-            if s.is_finite() && w[i] > 0.0 {
-                stated = (stated.0 + w[i] * s * s, stated.1 + 1);
-                if problem.saturation.is_none() {
-                    variance[i] = (w[i] * residuals.slope[i] * s).powi(2);
-                }
-            }
-        }
-    }
-    let mut sums = ChannelSums {
-        cost: residuals.cost,
-        normal: DMatrix::zeros(k, k),
-        spread: DMatrix::zeros(k, k),
-        common: vec![DVector::zeros(k); measurement.common.len()],
-        dark: (0..n).any(|i| w[i] > 0.0 && block.x[i] == f64::NEG_INFINITY),
-        stated,
-        neighbours: Neighbours::of(&residuals.r, &residuals.trust, w, pairs),
-    };
-    vectorised(Weighted { columns, weight: &bread, into: &mut sums.normal });
-    vectorised(Weighted { columns, weight: &variance, into: &mut sums.spread });
-    for (component, total) in sums.common.iter_mut().enumerate() {
-        let u = measurement.common_plane(component, own);
-        let moved = |i: usize| {
-            let shift = u[block.index[i] as usize];
-            if shift.is_finite() { w[i] * residuals.trust[i] * residuals.slope[i] * data_slopes[i] * shift } else { 0.0 }
-        };
-        let moved: Vec<f64> = (0..n).map(moved).collect();
-        total.iter_mut().zip(columns).for_each(|(t, column)| *t = vectorised(Dot(&moved, column)));
-    }
-    sums
+    (0..block.len()).map(slope).collect()
 }

@@ -88,7 +88,7 @@ impl Profile<'_> {
             held.bounds[self.parameter - weights] = (value, value);
             start[self.parameter - weights] = value;
         }
-        let search = Search { problem: &held, ..*self.search };
+        let search = self.search.of(&held);
         let mut lm = LevenbergMarquardt::bounded(held.bounds.clone());
         lm.ftol = 1e-10;
         let found = solver::minimize(&search, lm, start, 30);

@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use super::samples::Block;
 use crate::geometry::HalfDiff;
-use crate::measurement::MerlGrid;
-use crate::numeric::simd::{Kernel, ln_1p, vectorised};
+use crate::measurement::{MerlAngles, MerlGrid};
+use crate::numeric::simd::{Kernel, dot, ln_1p, vectorised};
 
 /// Lines of a block: it fixes how sums are bracketed, so it must not depend on the number of threads.
-const LINES: usize = 15;
+const LINES: usize = 5;
 
 /// The geometry of the grid.
 #[derive(Debug)]
@@ -22,6 +22,8 @@ pub(super) struct MerlLines {
     /// Least cosine of θi and θo, positive.
     least_cos: f64,
     solid_angle: bool,
+    /// Whether entries are read at the lower edges of their bins.
+    edge: bool,
 }
 
 /// A run of samples: entries `first` on, at φd bins `bins`.
@@ -58,6 +60,7 @@ impl MerlLines {
             sin_phi_squared: phi.iter().map(|p| p.0 * p.0).collect(),
             least_cos: least_cos.max(f64::MIN_POSITIVE),
             solid_angle,
+            edge: grid.angles == MerlAngles::Edge,
         }
     }
 
@@ -99,6 +102,154 @@ impl MerlLines {
     }
 }
 
+/// What a line adds to the transforms of a linear loss: samples at φd and 180° − φd have the same cosα, for they are each other with
+/// the directions swapped, so they are added first. `M` channels that share one mask.
+pub(super) struct Folded<'a, const M: usize> {
+    pub lines: &'a MerlLines,
+    pub line: &'a Line,
+    /// Each channel's values on the line; NaN where masked.
+    pub values: [&'a [f64]; M],
+    /// Whether the residual is times cosθi.
+    pub cosine: bool,
+    /// Filled: coordinates, then w g² and w g² y of every channel.
+    pub x: &'a mut Vec<f64>,
+    pub sums: &'a mut [Vec<f64>],
+    pub seen: &'a mut Seen<M>,
+}
+
+/// What is found on the way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen<const M: usize> {
+    /// Samples that count.
+    pub count: f64,
+    /// Σ w over them, before normalisation.
+    pub weight: f64,
+    /// Σ w g² y² of each channel.
+    pub energy: [f64; M],
+    /// Largest |y|.
+    pub largest: f64,
+    /// Values that are masked where another channel's are not.
+    pub unlike: f64,
+}
+
+impl<const M: usize> Default for Seen<M> {
+    fn default() -> Self {
+        Self { count: 0.0, weight: 0.0, energy: [0.0; M], largest: 0.0, unlike: 0.0 }
+    }
+}
+
+impl<const M: usize> Seen<M> {
+    pub fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        self.weight += other.weight;
+        self.energy.iter_mut().zip(&other.energy).for_each(|(a, b)| *a += b);
+        self.largest = self.largest.max(other.largest);
+        self.unlike += other.unlike;
+    }
+}
+
+/// Room for a line.
+type Row = [f64; MerlGrid::PHI_D];
+
+impl<const M: usize> Kernel for Folded<'_, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let line = self.line;
+        let (n, w) = (line.bins.len(), line.weight);
+        let (a, b) = (line.theta_h.1 * line.theta_d.1, line.theta_h.0 * line.theta_d.0);
+        let fold = Fold::of(n, self.lines.edge && line.bins.start == 0);
+        let cos_phi = &self.lines.cos_phi[line.bins.clone()][..n];
+        let first = &self.values[0][..n];
+        let (mut omega, mut valid, mut y, mut product) = (ROW, ROW, ROW, ROW);
+        for i in 0..n {
+            let g = if self.cosine { a - b * cos_phi[i] } else { 1.0 };
+            valid[i] = if first[i].is_nan() { 0.0 } else { 1.0 };
+            omega[i] = w * g * g * valid[i];
+        }
+        let count = dot(&valid[..n], &valid[..n]);
+        self.seen.count += count;
+        self.seen.weight += w * count;
+        fold.apply(&omega, &mut self.sums[0]);
+        for m in 0..M {
+            let values = &self.values[m][..n];
+            for i in 0..n {
+                let known = if values[i].is_nan() { 0.0 } else { 1.0 };
+                product[i] = known - valid[i];
+                y[i] = if values[i].is_nan() { 0.0 } else { values[i] };
+            }
+            self.seen.unlike += dot(&product[..n], &product[..n]);
+            for i in 0..n {
+                product[i] = omega[i] * y[i];
+            }
+            self.seen.energy[m] += dot(&product[..n], &y[..n]);
+            self.seen.largest = largest(&y[..n], self.seen.largest);
+            fold.apply(&product, &mut self.sums[1 + m]);
+        }
+        let sin_phi_squared = &self.lines.sin_phi_squared[line.bins.clone()][..fold.len()];
+        self.x.resize(fold.len(), 0.0);
+        LnCosAlpha {
+            twice_sin_h_squared: 2.0 * line.theta_h.0 * line.theta_h.0,
+            sin_d_squared: line.theta_d.0 * line.theta_d.0,
+            sin_phi_squared,
+            out: self.x,
+        }
+        .run();
+    }
+}
+
+const ROW: Row = [0.0; MerlGrid::PHI_D];
+
+/// How a line folds about φd = 90°.
+#[derive(Debug, Clone, Copy)]
+struct Fold {
+    /// Samples of the line.
+    n: usize,
+    /// Whether the first has no partner: the lower edge of the first bin, whose partner would lie at 180°.
+    alone: usize,
+    pairs: usize,
+}
+
+impl Fold {
+    #[inline(always)]
+    fn of(n: usize, alone: bool) -> Self {
+        let alone = usize::from(alone);
+        Self { n, alone, pairs: (n - alone) / 2 }
+    }
+
+    /// Samples left: the pairs, the one alone, and the middle where there is one.
+    #[inline(always)]
+    fn len(self) -> usize {
+        self.n - self.pairs
+    }
+
+    #[inline(always)]
+    fn apply(self, from: &Row, to: &mut Vec<f64>) {
+        to.resize(self.len(), 0.0);
+        to.copy_from_slice(&from[..self.len()]);
+        let near = &mut to[self.alone..self.alone + self.pairs];
+        let far = &from[self.n - self.pairs..self.n];
+        for i in 0..self.pairs {
+            near[i] += far[self.pairs - 1 - i];
+        }
+    }
+}
+
+/// The largest of `start` and all |y|.
+#[inline(always)]
+fn largest(y: &[f64], start: f64) -> f64 {
+    let (chunks, rest) = y.as_chunks::<8>();
+    let mut lanes = [start; 8];
+    for chunk in chunks {
+        for k in 0..8 {
+            let size = chunk[k].abs();
+            lanes[k] = if size > lanes[k] { size } else { lanes[k] };
+        }
+    }
+    lanes.iter().copied().chain(rest.iter().map(|y| y.abs())).fold(start, f64::max)
+}
+
 /// ln cosα of a line: 1 − cosα = 2 sin²θh (1 − sin²θd sin²φd), small differences of which keep their digits.
 struct LnCosAlpha<'a> {
     twice_sin_h_squared: f64,
@@ -126,7 +277,6 @@ impl Kernel for LnCosAlpha<'_> {
 mod tests {
     use super::*;
     use crate::brdf::lobe::ln_cos_alpha;
-    use crate::measurement::MerlAngles;
 
     #[test]
     fn lines_are_the_entries_that_pass_one_by_one() {
@@ -149,6 +299,7 @@ mod tests {
                             assert!(near || cos < 1e-15, "entry {entry}: {got:e} vs {want:e}");
                             assert_eq!(line.weight, MerlGrid::solid_angle(entry));
                         }
+                        folded_sums_are_the_line_s(&lines, &line, &block);
                         found.extend(line.entries());
                     }
                 }
@@ -161,5 +312,28 @@ mod tests {
                 assert_eq!(found, want, "{angles:?} {limit}");
             }
         }
+    }
+
+    /// The fold keeps Σ ω e^{sx} and Σ ω y e^{sx}, masked values left out.
+    fn folded_sums_are_the_line_s(lines: &MerlLines, line: &Line, block: &Block) {
+        let value = |k: usize| if k % 7 == 3 { f64::NAN } else { 0.3 + (k as f64 * 0.7).sin() };
+        let y: Vec<f64> = (0..line.bins.len()).map(value).collect();
+        let (mut x, mut sums, mut seen) = (Vec::new(), vec![Vec::new(); 3], Seen::<2>::default());
+        let (x_out, values) = (&mut x, [&y[..], &y[..]]);
+        vectorised(Folded { lines, line, values, cosine: true, x: x_out, sums: &mut sums, seen: &mut seen });
+        for s in [0.0, 1.0, 20.0] {
+            let lobe = |x: &f64| if x.is_finite() { (s * x).exp() } else { 0.5 };
+            let mut want = [0.0; 2];
+            for ((y, g), x) in y.iter().zip(&block.cos_i).zip(&block.x).filter(|((y, _), _)| !y.is_nan()) {
+                let omega = line.weight * g * g * lobe(x);
+                want = [want[0] + omega, want[1] + omega * y];
+            }
+            for (m, want) in [(0, want[0]), (1, want[1]), (2, want[1])] {
+                let got: f64 = sums[m].iter().zip(&x).map(|(v, x)| v * lobe(x)).sum();
+                assert!((got - want).abs() <= 1e-13 * line.weight * 180.0, "{got} {want}");
+            }
+        }
+        assert_eq!(seen.count as usize, y.iter().filter(|y| !y.is_nan()).count());
+        assert_eq!((seen.unlike, y.len() < 4), (0.0, y.len() < 4));
     }
 }

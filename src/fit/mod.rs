@@ -62,13 +62,13 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![&all] };
     let mut parts = Vec::new();
     for group in &groups {
-        let samples = Samples::gather(measurement, &model, options, group)?;
-        parts.push(part::fit(&samples, &model, &ranges, options)?);
+        let (samples, transforms) = Samples::gather(measurement, &model, options, group)?;
+        parts.push(part::fit(&samples, transforms, &model, &ranges, options)?);
     }
     let samples = if let [part] = &parts[..] {
         part.samples
     } else {
-        Samples::gather(measurement, &model, options, &all)?.len()
+        Samples::gather(measurement, &model, options, &all)?.0.len()
     };
     let facts = record::Facts { measurement, options, model: &model, ranges: &ranges, parts: &parts, samples };
     let mut material = record::material(&facts);

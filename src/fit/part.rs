@@ -4,9 +4,9 @@ use super::covariance::{self, Uncertainty};
 use super::intervals::{self, Intervals};
 use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
-use super::passes::{self, Columns, Residuals, Saturation};
+use super::passes::{self, Saturation, Scratch};
 use super::reduced::{Problem, Search, Solution, Streamed, polish};
-use super::samples::Samples;
+use super::samples::{PIECES, Samples, Transforms};
 use super::solver::{self, Iteration, LevenbergMarquardt, Stop};
 use super::start::{self, SearchReport};
 use super::structure::{self, Structure};
@@ -44,6 +44,7 @@ const LOST_CONDITION: f64 = 1e8;
 /// Fits the samples.
 pub(super) fn fit(
     samples: &Samples<'_>,
+    transforms: Option<Transforms>,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
@@ -51,8 +52,8 @@ pub(super) fn fit(
     let problem = Problem::new(samples, model, ranges, options.conserve_energy);
     problem.check(&samples.measurement.channels)?;
     if options.robust.is_none() && problem.is_transformable() {
-        let (transform, energy) = passes::transform(samples);
-        let search = Search { problem: &problem, transform: &transform, energy: &energy };
+        let (transform, energy) = transforms.unwrap_or_else(|| passes::transform(samples));
+        let search = Search::new(&problem, &transform, &energy);
         return by_search(&search, options);
     }
     by_passes(&problem, options)
@@ -66,7 +67,8 @@ pub(super) fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Par
     if solution.cost < LOST_COST * energy || condition(search, &solution) > LOST_CONDITION {
         solution = polish(search, solution);
     }
-    let uncertainty = covariance::uncertainty(search.problem, &solution);
+    let moments = search.moments(&solution.lobes, true);
+    let uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments));
     solution.cost = uncertainty.cost;
     let intervals = intervals::profiled(search, &solution, &uncertainty);
     finish(search.problem, solution, uncertainty, intervals, found)
@@ -134,7 +136,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     }
     found.outcome.stop = stop;
     found.outcome.history = history;
-    let uncertainty = covariance::uncertainty(&problem, &solution);
+    let uncertainty = covariance::uncertainty(&problem, &solution, None);
     solution.cost = uncertainty.cost;
     let intervals = intervals::plain(&problem, &solution, &uncertainty);
     finish(&problem, solution, uncertainty, intervals, found)
@@ -144,16 +146,14 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
 /// that still is a scale.
 fn spread(problem: &Problem<'_>, at: &Solution) -> f64 {
     let samples = problem.samples;
-    let blocks = samples.map_blocks(|block| {
-        let basis = Columns::fill(block, &at.lobes);
-        let mut list = Vec::new();
+    let pieces = samples.map_pieces(PIECES, || (Vec::new(), Scratch::default()), |(list, scratch), block| {
+        scratch.basis(block, &at.lobes);
         for (c, x) in at.weights.iter().enumerate() {
-            let residuals = Residuals::at(samples, block, c, &basis.model(x), None);
-            list.extend(residuals.r.iter().zip(block.weight(c)).filter(|(_, w)| **w > 0.0).map(|(r, _)| *r));
+            scratch.residuals(samples, block, c, x, None);
+            list.extend(scratch.r.iter().zip(block.weight(c)).filter(|(_, w)| **w > 0.0).map(|(r, _)| *r));
         }
-        list
     });
-    let mut r: Vec<f64> = blocks.into_iter().flatten().collect();
+    let mut r: Vec<f64> = pieces.into_iter().flat_map(|(list, _)| list).collect();
     let centre = median(&mut r);
     r.iter_mut().for_each(|r| *r = (*r - centre).abs());
     let deviation = median(&mut r);

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::loss::{Loss, Robust, RobustKind};
-use super::samples::{Block, Samples};
+use super::samples::{Block, PIECES, Samples, Transforms};
 use super::transform::Transform;
 use crate::brdf::LobeKind;
 use crate::numeric::simd::{Kernel, dot, dot3, vectorised};
@@ -24,41 +24,202 @@ pub(super) fn saturation(robust: Option<Robust>, sigma: f64) -> Saturation {
     robust.map(|r| (r.kind, r.scale * sigma))
 }
 
-/// Basis columns of one block: lobe values φ, then for each shape parameter dφ/dt with t = ln(shape).
+/// What a pass works out of a block, in lists that are used again for the next one.
 #[derive(Debug, Default)]
-pub(super) struct Columns {
-    pub all: Vec<Vec<f64>>,
-    lobes: usize,
+pub(super) struct Scratch {
+    /// Basis columns: lobe values φ, then for each shape parameter dφ/dt with t = ln(shape).
+    pub columns: Vec<Vec<f64>>,
+    /// Model values f of one channel.
+    pub f: Vec<f64>,
+    /// Residuals r.
+    pub r: Vec<f64>,
+    /// ∂r/∂f.
+    pub slope: Vec<f64>,
+    /// ρ′, the robust weight; empty without a robust loss, where it is 1.
+    pub trust: Vec<f64>,
+    /// w ρ′ r ∂r/∂f: half the cost's slope by f.
+    pub pull: Vec<f64>,
+    /// What products of columns are weighted by.
+    pub weight: Vec<f64>,
 }
 
-impl Columns {
-    pub fn fill(block: &Block, lobes: &[ShapedLobe]) -> Self {
-        let n = block.len();
-        let mut all = Vec::new();
-        let mut slopes = Vec::new();
-        for lobe in lobes {
-            let mut phi = vec![0.0; n];
-            let mut own = vec![vec![0.0; n]; lobe.shape.len()];
-            lobe.kind.lobe().fill(&lobe.shape, &block.x, &mut phi, &mut own);
+impl Scratch {
+    /// Fills the columns.
+    pub fn basis(&mut self, block: &Block, lobes: &[ShapedLobe]) {
+        let slopes: usize = lobes.iter().map(|l| l.shape.len()).sum();
+        self.columns.resize_with(lobes.len() + slopes, Vec::new);
+        self.columns.iter_mut().for_each(|c| c.resize(block.len(), 0.0));
+        let (values, derivatives) = self.columns.split_at_mut(lobes.len());
+        let mut next = 0;
+        for (lobe, phi) in lobes.iter().zip(values) {
+            let own = &mut derivatives[next..next + lobe.shape.len()];
+            next += lobe.shape.len();
+            lobe.kind.lobe().fill(&lobe.shape, &block.x, phi, own);
             for (list, s) in own.iter_mut().zip(&lobe.shape) {
-                list.iter_mut().for_each(|d| *d *= s);
+                vectorised(Scale(list, *s));
             }
-            all.push(phi);
-            slopes.extend(own);
         }
-        let count = all.len();
-        all.extend(slopes);
-        Self { all, lobes: count }
     }
 
-    /// Σ x φ.
-    pub fn model(&self, x: &DVector<f64>) -> Vec<f64> {
-        let mut f = vec![0.0; self.all.first().map_or(0, Vec::len)];
-        for (phi, x) in self.all[..self.lobes].iter().zip(x.iter()) {
-            f.iter_mut().zip(phi).for_each(|(f, p)| *f = x.mul_add(*p, *f));
+    /// Fills model values, residuals and what follows from them for one channel with weights `x`, and returns its Σ w s² ρ. The columns must
+    /// be there.
+    pub fn residuals(
+        &mut self,
+        samples: &Samples<'_>,
+        block: &Block,
+        channel: usize,
+        x: &DVector<f64>,
+        saturation: Saturation,
+    ) -> f64 {
+        let n = block.len();
+        [&mut self.f, &mut self.r, &mut self.slope, &mut self.pull].into_iter().for_each(|l| l.resize(n, 0.0));
+        vectorised(Model { phi: &self.columns[..x.len()], x: x.as_slice(), f: &mut self.f });
+        samples.gain(block, channel, &mut self.slope);
+        let (w, y) = (block.weight(channel), &block.y[channel]);
+        if samples.loss.is_linear() && saturation.is_none() {
+            self.trust.clear();
+            let (r, pull) = (&mut self.r, &mut self.pull);
+            return vectorised(Linear { f: &self.f, y, w, gain: &self.slope, r, pull });
         }
-        f
+        let targets: Vec<f64> = if samples.loss.is_linear() {
+            y.clone()
+        } else {
+            let datum = |(y, c): (&f64, &f64)| super::loss::Datum { value: *y, cos_i: *c, epsilon: 0.0 };
+            y.iter().zip(&block.cos_i).map(|p| samples.loss.target(datum(p))).collect()
+        };
+        self.trust.resize(n, 0.0);
+        let data = Data { f: &self.f, cos_i: &block.cos_i, target: &targets, w };
+        let out = Out { r: &mut self.r, slope: &mut self.slope, trust: &mut self.trust, pull: &mut self.pull };
+        vectorised(Evaluate { loss: samples.loss, saturation, data, out })
     }
+
+    /// Fills the weight with w ρ′ (∂r/∂f)², the Gauss–Newton weight.
+    pub fn curvature(&mut self, w: &[f64]) {
+        self.weight.resize(w.len(), 0.0);
+        let (slope, trust) = (&self.slope, &self.trust);
+        let plain = w.iter().zip(slope).map(|(w, s)| w * s * s);
+        if trust.is_empty() {
+            self.weight.iter_mut().zip(plain).for_each(|(to, v)| *to = v);
+        } else {
+            self.weight.iter_mut().zip(plain.zip(trust)).for_each(|(to, (v, t))| *to = v * t);
+        }
+    }
+
+    /// Adds Σ pull·col and the lower triangle of Σ weight·col·col.
+    pub fn tally(&self, columns: usize, gradient: &mut DVector<f64>, products: &mut DMatrix<f64>) {
+        let into = Into { gradient: gradient.as_mut_slice(), products };
+        let (list, pull, weight) = (&self.columns[..columns], &self.pull[..], &self.weight[..]);
+        match columns {
+            1 => vectorised(Tally::<1> { columns: list, pull, weight, into }),
+            2 => vectorised(Tally::<2> { columns: list, pull, weight, into }),
+            3 => vectorised(Tally::<3> { columns: list, pull, weight, into }),
+            4 => vectorised(Tally::<4> { columns: list, pull, weight, into }),
+            5 => vectorised(Tally::<5> { columns: list, pull, weight, into }),
+            _ => {
+                vectorised(Projected { columns: list, on: pull, into: into.gradient });
+                vectorised(Weighted { columns: list, weight, into: into.products });
+            }
+        }
+    }
+}
+
+struct Scale<'a>(&'a mut [f64], f64);
+
+impl Kernel for Scale<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.iter_mut().for_each(|v| *v *= self.1);
+    }
+}
+
+/// f = Σ x φ.
+struct Model<'a> {
+    phi: &'a [Vec<f64>],
+    x: &'a [f64],
+    f: &'a mut [f64],
+}
+
+impl Kernel for Model<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.f.fill(0.0);
+        for (phi, x) in self.phi.iter().zip(self.x) {
+            self.f.iter_mut().zip(phi).for_each(|(f, p)| *f = x.mul_add(*p, *f));
+        }
+    }
+}
+
+struct Into<'a> {
+    gradient: &'a mut [f64],
+    products: &'a mut DMatrix<f64>,
+}
+
+/// All sums of K columns at once, in registers.
+struct Tally<'a, const K: usize> {
+    columns: &'a [Vec<f64>],
+    pull: &'a [f64],
+    weight: &'a [f64],
+    into: Into<'a>,
+}
+
+/// Running sums side by side.
+const LANES: usize = 8;
+
+impl<'a, const K: usize> Kernel for Tally<'a, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let n = self.pull.len();
+        let chunks = |list: &'a [f64]| list[..n].as_chunks::<LANES>();
+        let (pull, pull_rest) = chunks(self.pull);
+        let (weight, weight_rest) = chunks(self.weight);
+        let mut columns = [(&pull[..], &pull_rest[..]); K];
+        for a in 0..K {
+            columns[a] = chunks(&self.columns[a]);
+            columns[a].0 = &columns[a].0[..pull.len()];
+        }
+        let weight = &weight[..pull.len()];
+        let mut gradient = [[0.0f64; LANES]; K];
+        let mut products = [[[0.0f64; LANES]; K]; K];
+        for i in 0..pull.len() {
+            for a in 0..K {
+                let column = &columns[a].0[i];
+                let mut weighted = [0.0; LANES];
+                for k in 0..LANES {
+                    gradient[a][k] = pull[i][k].mul_add(column[k], gradient[a][k]);
+                    weighted[k] = weight[i][k] * column[k];
+                }
+                // A fixed range, so that the loops unroll and the sums stay in registers.
+                for b in 0..K {
+                    if b <= a {
+                        let other = &columns[b].0[i];
+                        for k in 0..LANES {
+                            products[a][b][k] = weighted[k].mul_add(other[k], products[a][b][k]);
+                        }
+                    }
+                }
+            }
+        }
+        for a in 0..K {
+            let rest = columns[a].1;
+            self.into.gradient[a] += gradient[a].iter().sum::<f64>() + plain_dot(pull_rest, rest);
+            for b in 0..=a {
+                let last: f64 =
+                    weight_rest.iter().zip(rest).zip(columns[b].1).map(|((w, x), y)| w * x * y).sum();
+                self.into.products[(a, b)] += products[a][b].iter().sum::<f64>() + last;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn plain_dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Gram matrices and data vectors of a linear loss. `K` columns: the lobe values, then their slopes.
@@ -80,7 +241,8 @@ impl Moments {
 /// w g² of a linear loss over a block, list by list.
 fn omega(samples: &Samples<'_>, block: &Block) -> Vec<Vec<f64>> {
     let of = |c: usize| {
-        let g = samples.gain(block, c);
+        let mut g = vec![0.0; block.len()];
+        samples.gain(block, c, &mut g);
         block.weight(c).iter().zip(&g).map(|(w, g)| w * g * g).collect()
     };
     (0..samples.lists()).map(of).collect()
@@ -88,7 +250,7 @@ fn omega(samples: &Samples<'_>, block: &Block) -> Vec<Vec<f64>> {
 
 /// The transforms of a linear loss's weights and weighted data (measures: lists, then channels), and each channel's energy
 /// Σ w g² y².
-pub(super) fn transform(samples: &Samples<'_>) -> (Transform, Vec<f64>) {
+pub(super) fn transform(samples: &Samples<'_>) -> Transforms {
     // Each piece has its own sums: few enough that adding them costs nothing, and as many whatever the number of threads.
     let (lists, channels) = (samples.lists(), samples.channels.len());
     let parts = samples.map_pieces(PIECES, || (Transform::new(lists + channels), vec![0.0; channels]), |sums, block| {
@@ -108,9 +270,6 @@ pub(super) fn transform(samples: &Samples<'_>) -> (Transform, Vec<f64>) {
     }
     total
 }
-
-/// Pieces that a pass with large sums is cut into; it fixes how they are bracketed.
-const PIECES: usize = 16;
 
 struct Dot<'a>(&'a [f64], &'a [f64]);
 
@@ -158,19 +317,23 @@ pub(super) fn sums(
     let columns = lobes.len() + if want == Want::Weights { 0 } else { slopes };
     let matrix = if want == Want::Gradient { 0 } else { columns };
     let zero = Sums { cost: 0.0, gradient: DVector::zeros(columns), normal: DMatrix::zeros(matrix, matrix) };
-    let parts = samples.map_blocks(|block| {
-        let basis = Columns::fill(block, lobes);
-        let channel = |(c, x): (usize, &DVector<f64>)| {
-            let residuals = Residuals::at(samples, block, c, &basis.model(x), saturation);
-            let mut sums = zero.clone();
-            sums.cost = residuals.cost;
-            vectorised(Products { columns: &basis.all[..columns], of: &residuals, into: &mut sums });
-            sums
-        };
-        weights.iter().enumerate().map(channel).collect::<Vec<Sums>>()
+    let start = || (vec![zero.clone(); weights.len()], Scratch::default());
+    let parts = samples.map_pieces(PIECES, start, |(sums, scratch), block| {
+        scratch.basis(block, lobes);
+        for (c, x) in weights.iter().enumerate() {
+            let sums = &mut sums[c];
+            sums.cost += scratch.residuals(samples, block, c, x, saturation);
+            if matrix > 0 {
+                scratch.curvature(block.weight(c));
+                scratch.tally(columns, &mut sums.gradient, &mut sums.normal);
+            } else {
+                let (columns, on) = (&scratch.columns[..columns], &scratch.pull[..]);
+                vectorised(Projected { columns, on, into: sums.gradient.as_mut_slice() });
+            }
+        }
     });
     let mut total = vec![zero.clone(); weights.len()];
-    for part in parts {
+    for (part, _) in parts {
         for (total, part) in total.iter_mut().zip(part) {
             total.cost += part.cost;
             total.gradient += part.gradient;
@@ -181,41 +344,33 @@ pub(super) fn sums(
     total
 }
 
-/// Residuals of one channel over a block, and what follows from them.
-pub(super) struct Residuals {
-    /// r.
-    pub r: Vec<f64>,
-    /// ∂r/∂f.
-    pub slope: Vec<f64>,
-    /// ρ′, the robust weight; 1 without a robust loss.
-    pub trust: Vec<f64>,
-    /// w ρ′ r ∂r/∂f: half the cost's slope by f.
-    pub pull: Vec<f64>,
-    /// w ρ′ (∂r/∂f)².
-    pub curvature: Vec<f64>,
-    /// Σ w s² ρ.
-    pub cost: f64,
+/// A linear loss: r = g (f − y) and w g r; returns Σ w r².
+struct Linear<'a> {
+    f: &'a [f64],
+    y: &'a [f64],
+    w: &'a [f64],
+    gain: &'a [f64],
+    r: &'a mut [f64],
+    pull: &'a mut [f64],
 }
 
-impl Residuals {
-    /// At the model values `f`.
-    pub fn at(samples: &Samples<'_>, block: &Block, channel: usize, f: &[f64], saturation: Saturation) -> Self {
-        let n = block.len();
-        let gain = samples.gain(block, channel);
-        let zero = || vec![0.0; n];
-        let mut out = Self { r: zero(), slope: zero(), trust: zero(), pull: zero(), curvature: zero(), cost: 0.0 };
-        let targets;
-        let target = if samples.loss.is_linear() {
-            &block.y[channel]
-        } else {
-            let datum = |(y, c): (&f64, &f64)| super::loss::Datum { value: *y, cos_i: *c, epsilon: 0.0 };
-            targets = block.y[channel].iter().zip(&block.cos_i).map(|p| samples.loss.target(datum(p))).collect::<Vec<_>>();
-            &targets
-        };
-        let w = block.weight(channel);
-        let data = Data { f, cos_i: &block.cos_i, gain: &gain, target, w };
-        vectorised(Evaluate { loss: samples.loss, saturation, data, out: &mut out });
-        out
+impl Kernel for Linear<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let n = self.r.len();
+        let (f, y, w, gain) = (&self.f[..n], &self.y[..n], &self.w[..n], &self.gain[..n]);
+        let (r, pull) = (&mut self.r[..n], &mut self.pull[..n]);
+        for i in 0..n {
+            r[i] = gain[i] * (f[i] - y[i]);
+            pull[i] = w[i] * r[i];
+        }
+        let cost = dot(r, pull);
+        for i in 0..n {
+            pull[i] *= gain[i];
+        }
+        cost
     }
 }
 
@@ -223,23 +378,30 @@ impl Residuals {
 struct Data<'a> {
     f: &'a [f64],
     cos_i: &'a [f64],
-    gain: &'a [f64],
     target: &'a [f64],
     w: &'a [f64],
+}
+
+/// Filled; `slope` holds the ∂r/∂f of a linear loss before.
+struct Out<'a> {
+    r: &'a mut [f64],
+    slope: &'a mut [f64],
+    trust: &'a mut [f64],
+    pull: &'a mut [f64],
 }
 
 struct Evaluate<'a> {
     loss: Loss,
     saturation: Saturation,
     data: Data<'a>,
-    out: &'a mut Residuals,
+    out: Out<'a>,
 }
 
 impl Kernel for Evaluate<'_> {
-    type Output = ();
+    type Output = f64;
 
     #[inline(always)]
-    fn run(self) {
+    fn run(self) -> f64 {
         // One loop a loss, so that each is free of branches.
         match self.loss {
             Loss::Log => self.of_loss(|f, c, g, t| Loss::Log.prepared(f, c, g, t)),
@@ -251,70 +413,58 @@ impl Kernel for Evaluate<'_> {
 
 impl Evaluate<'_> {
     #[inline(always)]
-    fn of_loss(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64)) {
-        match self.saturation {
-            None => self.each(residual, |r| (r * r, 1.0)),
-            Some((kind, s)) => {
-                let (square, inverse) = (s * s, 1.0 / (s * s));
-                let rho = |r: f64| {
-                    let (rho, weight, _) = kind.rho(r * r * inverse);
-                    (square * rho, weight)
-                };
-                self.each(residual, rho);
-            }
+    fn of_loss(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64)) -> f64 {
+        let Some((kind, s)) = self.saturation else { return self.each(residual, |r| (r * r, 1.0)) };
+        let (square, inverse) = (s * s, 1.0 / (s * s));
+        match kind {
+            RobustKind::Huber => self.each(residual, |r| {
+                let (rho, weight, _) = RobustKind::Huber.rho(r * r * inverse);
+                (square * rho, weight)
+            }),
+            RobustKind::Cauchy => self.each(residual, |r| {
+                let (rho, weight, _) = RobustKind::Cauchy.rho(r * r * inverse);
+                (square * rho, weight)
+            }),
         }
     }
 
     #[inline(always)]
-    fn each(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64), rho: impl Fn(f64) -> (f64, f64)) {
+    fn each(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64), rho: impl Fn(f64) -> (f64, f64)) -> f64 {
         let n = self.data.f.len();
-        let Data { f, cos_i, gain, target, w } = self.data;
-        let (f, cos_i, gain, target, w) = (&f[..n], &cos_i[..n], &gain[..n], &target[..n], &w[..n]);
-        let out = self.out;
-        let (r, slope, trust) = (&mut out.r[..n], &mut out.slope[..n], &mut out.trust[..n]);
-        let (pull, curvature) = (&mut out.pull[..n], &mut out.curvature[..n]);
+        let Data { f, cos_i, target, w } = self.data;
+        let (f, cos_i, target, w) = (&f[..n], &cos_i[..n], &target[..n], &w[..n]);
+        let (r, slope, trust, pull) =
+            (&mut self.out.r[..n], &mut self.out.slope[..n], &mut self.out.trust[..n], &mut self.out.pull[..n]);
         for i in 0..n {
-            let (ri, si) = residual(f[i], cos_i[i], gain[i], target[i]);
-            let (cost, ti) = rho(ri);
-            r[i] = ri;
-            slope[i] = si;
-            trust[i] = ti;
-            let ws = w[i] * ti * si;
-            curvature[i] = ws * si;
+            (r[i], slope[i]) = residual(f[i], cos_i[i], slope[i], target[i]);
             // The cost waits where the pull will stand.
-            pull[i] = cost;
+            (pull[i], trust[i]) = rho(r[i]);
         }
-        out.cost = dot(w, pull);
+        let cost = dot(w, pull);
         for i in 0..n {
             pull[i] = w[i] * trust[i] * slope[i] * r[i];
         }
+        cost
     }
 }
 
-/// Products of the columns with each other and with the residuals.
-struct Products<'a> {
-    columns: &'a [Vec<f64>],
-    of: &'a Residuals,
-    into: &'a mut Sums,
+/// Σ list·col of every column.
+pub(super) struct Projected<'a> {
+    pub columns: &'a [Vec<f64>],
+    pub on: &'a [f64],
+    pub into: &'a mut [f64],
 }
 
-impl Kernel for Products<'_> {
+impl Kernel for Projected<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        for (a, column) in self.columns.iter().enumerate() {
-            self.into.gradient[a] = dot(&self.of.pull, column);
-            if self.into.normal.nrows() > a {
-                for (b, other) in self.columns[..=a].iter().enumerate() {
-                    self.into.normal[(a, b)] = dot3(&self.of.curvature, column, other);
-                }
-            }
-        }
+        self.into.iter_mut().zip(self.columns).for_each(|(to, column)| *to += dot(self.on, column));
     }
 }
 
-/// Σ weight·col·col for several weights at once, lower triangles.
+/// Σ weight·col·col, the lower triangle.
 pub(super) struct Weighted<'a> {
     pub columns: &'a [Vec<f64>],
     pub weight: &'a [f64],

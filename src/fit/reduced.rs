@@ -168,10 +168,23 @@ impl<'a> Problem<'a> {
 pub(super) struct Search<'a> {
     pub problem: &'a Problem<'a>,
     pub transform: &'a Transform,
+    /// Σ w g² y² of each channel.
     pub energy: &'a [f64],
+    /// The transforms' sums over all samples.
+    totals: Vec<f64>,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    pub fn new(problem: &'a Problem<'a>, transform: &'a Transform, energy: &'a [f64]) -> Self {
+        let measures = problem.samples.lists() + problem.samples.channels.len();
+        Self { problem, transform, energy, totals: (0..measures).map(|m| transform.total(m)).collect() }
+    }
+
+    /// The same samples under other bounds.
+    pub fn of<'b>(&'b self, problem: &'b Problem<'b>) -> Search<'b> {
+        Search { problem, transform: self.transform, energy: self.energy, totals: self.totals.clone() }
+    }
+
     /// Gram matrices and data vectors at `lobes`, with the slopes by t on request.
     pub fn moments(&self, lobes: &[ShapedLobe], slopes: bool) -> Moments {
         let columns = PowerColumns::new(lobes, slopes);
@@ -179,27 +192,29 @@ impl Search<'_> {
         let (lists, channels) = (samples.lists(), samples.channels.len());
         let k = columns.list.len();
         let mut gram = vec![DMatrix::zeros(k, k); lists];
-        for (a, first) in columns.lobes.iter().enumerate() {
-            for (b, second) in columns.lobes.iter().enumerate().take(a + 1) {
-                let jets = match (first.exponent, second.exponent) {
-                    (None, None) => (0..lists).map(|l| [self.transform.total(l), 0.0, 0.0]).collect(),
-                    (n, m) => self.transform.at(n.unwrap_or(0.0) + m.unwrap_or(0.0), 0..lists),
-                };
-                for (list, jet) in jets.iter().enumerate() {
-                    columns.products(a, b, jet, &mut gram[list]);
-                }
-            }
-        }
         let mut data = vec![DVector::zeros(k); channels];
+        // A lobe alone: its products with constants, and with the data.
         for (a, lobe) in columns.lobes.iter().enumerate() {
             let jets = match lobe.exponent {
-                None => (0..channels).map(|c| [self.transform.total(lists + c), 0.0, 0.0]).collect(),
-                Some(n) => self.transform.at(n, lists..lists + channels),
+                None => self.totals.iter().map(|t| [*t, 0.0, 0.0]).collect(),
+                Some(n) => self.transform.at(n, 0..lists + channels),
             };
-            for (data, jet) in data.iter_mut().zip(&jets) {
+            let constants = columns.lobes.iter().enumerate().filter(|(_, other)| other.exponent.is_none());
+            for (b, _) in constants {
+                gram.iter_mut().zip(&jets).for_each(|(gram, jet)| columns.products(a, b, jet, gram));
+            }
+            for (data, jet) in data.iter_mut().zip(&jets[lists..]) {
                 for (i, column) in columns.list.iter().enumerate().filter(|(_, column)| column.lobe == a) {
                     data[i] = column.constant * jet[0] + column.linear * jet[1];
                 }
+            }
+        }
+        let shaped: Vec<(usize, f64)> =
+            columns.lobes.iter().enumerate().filter_map(|(l, lobe)| lobe.exponent.map(|n| (l, n))).collect();
+        for (place, &(a, n)) in shaped.iter().enumerate() {
+            for &(b, m) in &shaped[..=place] {
+                let jets = self.transform.at(n + m, 0..lists);
+                gram.iter_mut().zip(&jets).for_each(|(gram, jet)| columns.products(a, b, jet, gram));
             }
         }
         Moments { gram, data }

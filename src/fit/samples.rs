@@ -8,10 +8,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::loss::{Datum, Loss, RELATIVE_EPSILON};
-use super::merl_lines::MerlLines;
+use super::merl_lines::{Folded, MerlLines, Seen};
 use super::options::{FitError, FitOptions, WeightMode};
+use super::transform::Transform;
 use crate::brdf::{LobeKind, ModelSpec};
 use crate::measurement::{Directions, Measurement};
+use crate::numeric::simd::{Kernel, vectorised};
 use crate::numeric::sum::{self, BLOCK};
 
 /// Slack in the cosine that makes the angular limit inclusive whatever the rounding of the direction.
@@ -23,12 +25,14 @@ const CLUSTER: usize = 64;
 /// Samples in a row, structure of arrays. Lists by channel hold the channels of the fit, in its order.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Block {
-    /// Index of each sample in the measurement.
+    /// Index of each sample in the measurement; left out for a table without σ.
     pub index: Vec<u32>,
     /// cosθi.
     pub cos_i: Vec<f64>,
     /// Coordinate of the lobes that have a shape.
     pub x: Vec<f64>,
+    /// 1 where a sample is a neighbour of the one before, else 0.
+    pub pairs: Vec<f64>,
     /// Normalised weight w, one list for all channels or one a channel; 0 where masked.
     pub w: Vec<Vec<f64>>,
     /// Measured value over [`Samples::scale`], one list a channel; 0 where masked.
@@ -40,6 +44,7 @@ impl Block {
         self.index.clear();
         self.cos_i.clear();
         self.x.clear();
+        self.pairs.clear();
         self.w.resize_with(lists, Vec::new);
         self.y.resize_with(channels, Vec::new);
         self.w.iter_mut().chain(&mut self.y).for_each(Vec::clear);
@@ -47,7 +52,7 @@ impl Block {
 
     /// Number of samples.
     pub fn len(&self) -> usize {
-        self.index.len()
+        self.pairs.len()
     }
 
     /// Weights of one channel.
@@ -67,8 +72,12 @@ impl Block {
             .collect();
         order.par_sort_unstable();
         let pick = |list: &Vec<f64>| order.iter().map(|(_, k)| list[*k as usize]).collect();
+        let index: Vec<u32> = order.iter().map(|(_, k)| self.index[*k as usize]).collect();
         Self {
-            index: order.iter().map(|(_, k)| self.index[*k as usize]).collect(),
+            pairs: neighbours(&index, |a, b| {
+                wi[a].distance_squared(wi[b]) < SAME_INCIDENCE && wo[a].distance_squared(wo[b]) < FARTHEST
+            }),
+            index,
             cos_i: pick(&self.cos_i),
             x: pick(&self.x),
             w: self.w.iter().map(pick).collect(),
@@ -80,9 +89,21 @@ impl Block {
         self.index.extend_from_slice(&other.index);
         self.cos_i.extend_from_slice(&other.cos_i);
         self.x.extend_from_slice(&other.x);
+        self.pairs.extend_from_slice(&other.pairs);
         let pairs = self.w.iter_mut().chain(&mut self.y).zip(other.w.iter().chain(&other.y));
         pairs.for_each(|(list, more)| list.extend_from_slice(more));
     }
+}
+
+/// Incidences closer than this (squared chord of the unit sphere) are the same.
+const SAME_INCIDENCE: f64 = 1e-8;
+/// Directions farther apart than this (squared chord, about 14°) are no neighbours.
+const FARTHEST: f64 = 0.0625;
+
+/// 1 for every entry that is `near` the one before.
+fn neighbours(index: &[u32], near: impl Fn(usize, usize) -> bool) -> Vec<f64> {
+    let pair = |p: &[u32]| if near(p[0] as usize, p[1] as usize) { 1.0 } else { 0.0 };
+    std::iter::once(0.0).take(index.len()).chain(index.windows(2).map(pair)).collect()
 }
 
 /// A direction's polar ring and its place on it, coarse enough to overlook rounding.
@@ -93,6 +114,29 @@ fn place(w: DVec3) -> [i32; 2] {
     let round = if size > 1e-9 { w.y / size } else { 0.0 };
     let round = if w.x < 0.0 { 2.0 - round } else { round };
     [(w.z * STEPS).round() as i32, (round * STEPS).round() as i32]
+}
+
+/// Values over their unit, and their weights, 0 where masked.
+struct Values<'a> {
+    plane: &'a [f64],
+    unit: f64,
+    weight: f64,
+    y: &'a mut [f64],
+    w: &'a mut [f64],
+}
+
+impl Kernel for Values<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (y, v) in self.y.iter_mut().zip(self.plane) {
+            *y = if v.is_nan() { 0.0 } else { v * self.unit };
+        }
+        for (w, v) in self.w.iter_mut().zip(self.plane) {
+            *w = if v.is_nan() { 0.0 } else { self.weight };
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -141,13 +185,13 @@ struct Survey {
 }
 
 impl<'a> Samples<'a> {
-    /// Selects and prepares the samples of the given channels.
+    /// Selects and prepares the samples of the given channels; with them, where they come on the way, their transforms.
     pub fn gather(
         measurement: &'a Measurement,
         model: &ModelSpec,
         options: &FitOptions,
         channels: &[usize],
-    ) -> Result<Self, FitError> {
+    ) -> Result<(Self, Option<Transforms>), FitError> {
         let solid_angle = options.weights == WeightMode::SolidAngle && measurement.weights.known();
         let weighting = match (options.use_sigma, solid_angle) {
             (true, _) => "sigma",
@@ -168,15 +212,70 @@ impl<'a> Samples<'a> {
             refused: 0,
             weighting,
         };
+        let mut transforms = None;
         if let Some(lines) = samples.lines(options, solid_angle) {
+            transforms = samples.fold(&lines)?;
             samples.source = Source::Merl(lines);
         } else {
             let kind = model.lobes().iter().copied().find(|k| !k.lobe().parameters().is_empty());
             samples.list(kind, options, solid_angle)?;
         }
-        let survey = samples.survey();
-        samples.settle(&survey, options)?;
-        Ok(samples)
+        if transforms.is_none() {
+            let survey = samples.survey();
+            samples.settle(&survey, options)?;
+        }
+        Ok((samples, transforms))
+    }
+
+    /// The quick way through a table: samples are counted and the transforms summed in one pass over the values. `None` where the channels
+    /// have different masks, or the values are of a size that needs scaling first.
+    fn fold(&mut self, lines: &MerlLines) -> Result<Option<Transforms>, FitError> {
+        match self.channels.len() {
+            1 => self.fold_channels::<1>(lines),
+            3 => self.fold_channels::<3>(lines),
+            _ => Ok(None),
+        }
+    }
+
+    fn fold_channels<const M: usize>(&mut self, lines: &MerlLines) -> Result<Option<Transforms>, FitError> {
+        if self.loss == Loss::Relative {
+            return Ok(None);
+        }
+        let planes: [&[f64]; M] = std::array::from_fn(|m| self.measurement.plane(self.channels[m]));
+        let cosine = self.loss == Loss::CosineL2;
+        let piece = |p: usize| {
+            let (mut sums, mut seen) = (Transform::new(1 + M), Seen::<M>::default());
+            let (mut x, mut values) = (Vec::new(), vec![Vec::new(); 1 + M]);
+            for b in MerlLines::blocks() * p / PIECES..MerlLines::blocks() * (p + 1) / PIECES {
+                for line in lines.lines(b) {
+                    let on_line = planes.map(|plane| &plane[line.entries()]);
+                    let (x_out, sums_out) = (&mut x, &mut values[..]);
+                    vectorised(Folded { lines, line: &line, values: on_line, cosine, x: x_out, sums: sums_out, seen: &mut seen });
+                    sums.absorb(&x, &values);
+                }
+            }
+            (sums, seen)
+        };
+        let parts: Vec<(Transform, Seen<M>)> = (0..PIECES).into_par_iter().map(piece).collect();
+        let (mut total, mut seen) = (Transform::new(1 + M), Seen::<M>::default());
+        for (part, found) in &parts {
+            total.merge(part);
+            seen.add(found);
+        }
+        let plain = seen.unlike == 0.0 && seen.count > 0.0;
+        if !plain || !(LEAST_UNSCALED..1.0 / LEAST_UNSCALED).contains(&seen.largest) {
+            return Ok(None);
+        }
+        self.count = seen.count as usize;
+        self.counts = vec![self.count; M];
+        self.lists = 1;
+        self.scale = power_of_two(seen.largest);
+        let (factor, unit) = (seen.count / seen.weight, 1.0 / self.scale);
+        self.factor = vec![factor; M];
+        let mut factors = vec![factor * unit; 1 + M];
+        factors[0] = factor;
+        total.scale(&factors);
+        Ok(Some((total, seen.energy.map(|e| e * factor * unit * unit).to_vec())))
     }
 
     /// A MERL table needs no lists where every sample counts and its weight is plain.
@@ -249,6 +348,7 @@ impl<'a> Samples<'a> {
                 block.index.extend_from_slice(&all.index[range.clone()]);
                 block.cos_i.extend_from_slice(&all.cos_i[range.clone()]);
                 block.x.extend_from_slice(&all.x[range.clone()]);
+                block.pairs.extend_from_slice(&all.pairs[range.clone()]);
                 let pairs = block.w.iter_mut().chain(&mut block.y).zip(all.w.iter().chain(&all.y));
                 pairs.for_each(|(to, from)| to.extend_from_slice(&from[range.clone()]));
             }
@@ -263,16 +363,26 @@ impl<'a> Samples<'a> {
 
     /// Appends weights and values of entries in a row of a table.
     fn append_values(&self, entries: Range<usize>, weight: f64, block: &mut Block) {
-        let unit = 1.0 / self.scale;
+        let (start, unit) = (block.pairs.len(), 1.0 / self.scale);
+        let end = start + entries.len();
+        block.pairs.resize(end, 1.0);
+        block.pairs[start] = 0.0;
         for (c, y) in block.y.iter_mut().enumerate() {
             let plane = &self.measurement.plane(self.channels[c])[entries.clone()];
-            y.extend(plane.iter().map(|v| if v.is_nan() { 0.0 } else { v * unit }));
-            if c < self.lists {
-                let w = weight * self.factor[c];
-                block.w[c].extend(plane.iter().map(|v| if v.is_nan() { 0.0 } else { w }));
-            }
+            y.resize(end, 0.0);
+            let mut none = [];
+            let w = match block.w.get_mut(c).filter(|_| c < self.lists) {
+                None => &mut none[..],
+                Some(list) => {
+                    list.resize(end, 0.0);
+                    &mut list[start..]
+                }
+            };
+            vectorised(Values { plane, unit, weight: weight * self.factor[c], y: &mut y[start..], w });
         }
-        block.index.extend(entries.map(|e| e as u32));
+        if self.measurement.sigma.is_some() || !self.measurement.common.is_empty() {
+            block.index.extend(entries.map(|e| e as u32));
+        }
     }
 
     /// Lists every sample that counts, with raw weights.
@@ -293,8 +403,9 @@ impl<'a> Samples<'a> {
         // Weights may have any size: their sum must not overflow.
         let largest = all.w.iter().flatten().copied().fold(0.0, f64::max);
         all.w.iter_mut().flatten().for_each(|w| *w /= largest);
-        if let Directions::List { wi, wo } = &self.measurement.directions {
-            all = all.neighbours_together(wi, wo);
+        match &self.measurement.directions {
+            Directions::List { wi, wo } => all = all.neighbours_together(wi, wo),
+            Directions::Merl(_) => all.pairs = neighbours(&all.index, |a, b| b == a + 1),
         }
         self.source = Source::Listed(all);
         Ok(())
@@ -356,8 +467,7 @@ impl<'a> Samples<'a> {
         self.count = survey.directions;
         self.counts.clone_from(&survey.counts);
         if self.loss.is_homogeneous() && largest > 0.0 {
-            // A multiple of three, so that the cube root of it is a power of two as well.
-            self.scale = (3.0 * (largest.log2() / 3.0).floor()).exp2();
+            self.scale = power_of_two(largest);
         }
         let mean = |c: usize| if survey.weights[c] > 0.0 { survey.absolute[c] / survey.weights[c] } else { 0.0 };
         self.epsilon = (0..self.channels.len()).map(|c| RELATIVE_EPSILON * mean(c) / self.scale).collect();
@@ -383,9 +493,10 @@ impl<'a> Samples<'a> {
             self.fill(b, &mut block);
             for i in 0..block.len() {
                 if keep(position + i) {
-                    all.index.push(block.index[i]);
+                    all.index.extend(block.index.get(i));
                     all.cos_i.push(block.cos_i[i]);
                     all.x.push(block.x[i]);
+                    all.pairs.push(block.pairs[i]);
                     let pairs = all.w.iter_mut().chain(&mut all.y).zip(block.w.iter().chain(&block.y));
                     pairs.for_each(|(to, from)| to.push(from[i]));
                 }
@@ -393,17 +504,6 @@ impl<'a> Samples<'a> {
             position += block.len();
         }
         self.with(all)
-    }
-
-    /// These samples with every weight multiplied by `factor` (by position among the samples); the weights are not normalised again.
-    pub fn reweighted(&self, factor: impl Fn(usize) -> f64) -> Self {
-        let mut other = self.listed(|_| true);
-        if let Source::Listed(all) = &mut other.source {
-            for w in &mut all.w {
-                w.iter_mut().enumerate().for_each(|(i, w)| *w *= factor(i));
-            }
-        }
-        other
     }
 
     fn with(&self, all: Block) -> Self {
@@ -431,15 +531,32 @@ impl<'a> Samples<'a> {
         (0..block.len()).step_by(step).map(|from| from..(from + step).min(block.len())).collect()
     }
 
-    /// ∂r/∂f of a linear loss over a block, of one channel.
-    pub fn gain(&self, block: &Block, channel: usize) -> Vec<f64> {
+    /// Fills `out` with the ∂r/∂f of a linear loss over a block, of one channel.
+    pub fn gain(&self, block: &Block, channel: usize, out: &mut [f64]) {
         match self.loss {
-            Loss::L2 => vec![1.0; block.len()],
-            Loss::Relative => block.y[channel].iter().map(|y| 1.0 / (y.abs() + self.epsilon[channel])).collect(),
-            Loss::CosineL2 | Loss::Log | Loss::CubeRoot => block.cos_i.clone(),
+            Loss::L2 => out.fill(1.0),
+            Loss::Relative => {
+                let epsilon = self.epsilon[channel];
+                out.iter_mut().zip(&block.y[channel]).for_each(|(g, y)| *g = 1.0 / (y.abs() + epsilon));
+            }
+            Loss::CosineL2 | Loss::Log | Loss::CubeRoot => out.copy_from_slice(&block.cos_i),
         }
     }
 }
+
+/// A power of two near `largest` > 0, with an exponent that is a multiple of three, so that its cube root is a power of two as well.
+fn power_of_two(largest: f64) -> f64 {
+    (3.0 * (largest.log2() / 3.0).floor()).exp2()
+}
+
+/// Values between this and its inverse can be squared and summed without scaling.
+const LEAST_UNSCALED: f64 = 1e-100;
+
+/// Pieces that a pass with large sums is cut into; it fixes how they are bracketed.
+pub(super) const PIECES: usize = 16;
+
+/// The transforms of weights and weighted data (measures: lists, then channels), and each channel's energy Σ w g² y².
+pub(super) type Transforms = (Transform, Vec<f64>);
 
 fn least_cos(options: &FitOptions) -> f64 {
     options.max_angle_deg.to_radians().cos() - INCLUSIVE
@@ -511,6 +628,7 @@ impl Judge<'_> {
                 block.index.push(entry as u32);
                 block.cos_i.push(wi.z);
                 block.x.push(self.kind.map_or(0.0, |k| k.lobe().coordinate(wi, wo)));
+                block.pairs.push(0.0);
                 block.w.iter_mut().zip(&w).for_each(|(list, w)| list.push(*w));
                 block.y.iter_mut().zip(&y).for_each(|(list, y)| list.push(*y));
             }

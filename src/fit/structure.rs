@@ -1,51 +1,23 @@
 //! Noise or model error? Residuals of neighbouring directions are independent where they are noise, and alike where the model can't
 //! bend as the material does.
 
-use crate::measurement::{Directions, Measurement};
-
-use super::samples::Block;
+use crate::numeric::simd::{Kernel, dot, dot3, vectorised};
 
 /// Sums over pairs of neighbours.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Neighbours {
-    /// Σ √(w w′) r r′.
+    /// Σ √w r √w′ r′.
     product: f64,
-    /// Σ √(w w′) (r² + r′²)/2.
+    /// Σ (w r² + w′ r′²)/2.
     square: f64,
     /// Pairs.
     count: usize,
 }
 
-/// Incidences closer than this (chord of the unit sphere) are the same.
-const SAME_INCIDENCE: f64 = 1e-4;
-/// Directions farther apart than this (chord, about 14°) are no neighbours.
-const FARTHEST: f64 = 0.25;
-
 impl Neighbours {
-    /// Whether each sample of a block is a neighbour of the one before.
-    pub fn pairs(measurement: &Measurement, block: &Block) -> Vec<bool> {
-        let near = |pair: &[u32]| match &measurement.directions {
-            Directions::Merl(_) => pair[1] == pair[0] + 1,
-            Directions::List { wi, wo } => {
-                let (a, b) = (pair[0] as usize, pair[1] as usize);
-                wi[a].distance(wi[b]) < SAME_INCIDENCE && wo[a].distance(wo[b]) < FARTHEST
-            }
-        };
-        std::iter::once(false).take(block.len()).chain(block.index.windows(2).map(near)).collect()
-    }
-
-    /// Sums over one channel of a block; `trust` is the robust weight of each residual.
-    pub fn of(r: &[f64], trust: &[f64], w: &[f64], pairs: &[bool]) -> Self {
-        let mut sums = Self::default();
-        for i in (1..r.len()).filter(|&i| pairs[i]) {
-            let weight = (w[i] * trust[i] * w[i - 1] * trust[i - 1]).sqrt();
-            if weight > 0.0 {
-                sums.product += weight * r[i] * r[i - 1];
-                sums.square += 0.5 * weight * (r[i] * r[i] + r[i - 1] * r[i - 1]);
-                sums.count += 1;
-            }
-        }
-        sums
+    /// Sums over one channel of a block; `trust` is the robust weight of each residual, empty for 1.
+    pub fn of(r: &[f64], trust: &[f64], w: &[f64], pairs: &[f64]) -> Self {
+        vectorised(Sum { r, trust, w, pairs })
     }
 
     pub fn add(&mut self, other: &Self) {
@@ -58,6 +30,39 @@ impl Neighbours {
     pub fn correlation(&self) -> Option<(f64, f64)> {
         let enough = self.count >= 30 && self.square > 0.0;
         enough.then(|| (self.product / self.square, 1.0 / (self.count as f64).sqrt()))
+    }
+}
+
+struct Sum<'a> {
+    r: &'a [f64],
+    trust: &'a [f64],
+    w: &'a [f64],
+    pairs: &'a [f64],
+}
+
+impl Kernel for Sum<'_> {
+    type Output = Neighbours;
+
+    #[inline(always)]
+    fn run(self) -> Neighbours {
+        let n = self.r.len();
+        if n < 2 {
+            return Neighbours::default();
+        }
+        // √w r and its products with the next one's.
+        let mut u = vec![0.0; n];
+        for i in 0..n {
+            u[i] = self.w[i].sqrt() * self.r[i];
+        }
+        if !self.trust.is_empty() {
+            for i in 0..n {
+                u[i] *= self.trust[i].sqrt();
+            }
+        }
+        let pairs = &self.pairs[1..n];
+        let (before, after) = (&u[..n - 1], &u[1..]);
+        let square = 0.5 * (dot3(pairs, before, before) + dot3(pairs, after, after));
+        Neighbours { product: dot3(pairs, before, after), square, count: dot(pairs, pairs) as usize }
     }
 }
 
@@ -105,7 +110,7 @@ mod tests {
         let noise: Vec<f64> = (0..n).map(|_| rng.random::<f64>() - 0.5).collect();
         let slow: Vec<f64> = (0..n).map(|i| 0.5 * (0.01 * f64::from(i)).sin()).collect();
         let both: Vec<f64> = noise.iter().zip(&slow).map(|(a, b)| a + b).collect();
-        let (one, pairs) = (vec![1.0; n as usize], vec![true; n as usize]);
+        let (one, pairs) = (vec![1.0; n as usize], vec![1.0; n as usize]);
         let split = |r: &[f64]| {
             let rmse = (r.iter().map(|r| r * r).sum::<f64>() / f64::from(n)).sqrt();
             structure(rmse, None, &Neighbours::of(r, &one, &one, &pairs), n as usize).expect("pairs")

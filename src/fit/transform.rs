@@ -24,12 +24,10 @@ const BASE: u64 = ((1023 + LOWEST) as u64) << SPLIT;
 /// Bits of an f64 below the bin's number.
 const BELOW: u32 = 52 - SPLIT;
 
-/// Number, centre and half width of the bin that |x| = `v` falls into.
+/// The bin that |x| = `v` falls into.
 #[inline(always)]
-fn bin_of(v: f64) -> (usize, f64, f64) {
-    let bin = ((v.to_bits() >> BELOW).saturating_sub(BASE - 1) as usize).min(BINS - 1);
-    let (centre, half) = bin_geometry(bin);
-    (bin, centre, half)
+fn bin_number(v: f64) -> usize {
+    ((v.to_bits() >> BELOW).saturating_sub(BASE - 1) as usize).min(BINS - 1)
 }
 
 /// Centre and half width of a bin.
@@ -68,12 +66,40 @@ impl Transform {
 
     /// Adds samples at coordinates `x` ≤ 0 (−∞ where the lobes are 0); `values` holds one list a measure.
     pub fn absorb(&mut self, x: &[f64], values: &[Vec<f64>]) {
-        match values.len() {
-            2 => vectorised(Absorb::<2> { into: self, x, values }),
-            4 => vectorised(Absorb::<4> { into: self, x, values }),
-            6 => vectorised(Absorb::<6> { into: self, x, values }),
-            _ => vectorised(Absorb::<1> { into: self, x, values }),
+        match values {
+            [a, b] => vectorised(Absorb { into: self, x, values: [a, b] }),
+            [a, b, c, d] => vectorised(Absorb { into: self, x, values: [a, b, c, d] }),
+            [a, b, c, d, e, f] => vectorised(Absorb { into: self, x, values: [a, b, c, d, e, f] }),
+            many => {
+                // Any other number of channels: one at a time.
+                let (measures, mut single) = (self.measures, Self::new(1));
+                for (m, values) in many.iter().enumerate() {
+                    vectorised(Absorb { into: &mut single, x, values: [values] });
+                    let (first, last) = single.occupied;
+                    for bin in first..last.max(first) {
+                        let from = bin * MOMENTS..(bin + 1) * MOMENTS;
+                        let to = (bin * measures + m) * MOMENTS;
+                        let pairs = self.moments[to..to + MOMENTS].iter_mut().zip(&mut single.moments[from]);
+                        pairs.for_each(|(to, from)| *to += std::mem::take(from));
+                    }
+                    self.dark[m] += std::mem::take(&mut single.dark[0]);
+                    self.occupied = (self.occupied.0.min(first), self.occupied.1.max(last));
+                    single.occupied = (BINS, 0);
+                }
+            }
         }
+    }
+
+    #[inline(always)]
+    fn flush<const M: usize>(&mut self, bin: usize, held: &[[f64; MOMENTS]; M]) {
+        if held.iter().flatten().all(|v| *v == 0.0) {
+            return;
+        }
+        let (blocks, _) = self.moments[bin * M * MOMENTS..(bin + 1) * M * MOMENTS].as_chunks_mut::<MOMENTS>();
+        for (moments, held) in blocks.iter_mut().zip(held) {
+            (0..MOMENTS).for_each(|k| moments[k] += held[k]);
+        }
+        self.occupied = (self.occupied.0.min(bin), self.occupied.1.max(bin + 1));
     }
 
     /// Adds another's sums.
@@ -83,14 +109,6 @@ impl Transform {
         self.moments[range.clone()].iter_mut().zip(&other.moments[range]).for_each(|(a, b)| *a += b);
         self.dark.iter_mut().zip(&other.dark).for_each(|(a, b)| *a += b);
         self.occupied = (self.occupied.0.min(first), self.occupied.1.max(last));
-    }
-
-    /// Subtracts another's sums.
-    pub fn without(&self, other: &Self) -> Self {
-        let mut rest = self.clone();
-        rest.moments.iter_mut().zip(&other.moments).for_each(|(a, b)| *a -= b);
-        rest.dark.iter_mut().zip(&other.dark).for_each(|(a, b)| *a -= b);
-        rest
     }
 
     /// Multiplies the sums of each measure by a factor.
@@ -105,24 +123,27 @@ impl Transform {
 
     /// Σ value over all samples, those where the lobes are 0 included.
     pub fn total(&self, measure: usize) -> f64 {
-        self.at(0.0, measure..measure + 1)[0][0] + self.dark[measure]
+        let moments = self.moments.iter().skip(measure * MOMENTS).step_by(self.measures * MOMENTS);
+        moments.sum::<f64>() + self.dark[measure]
     }
 
     /// Σ value·e^{sx} for s ≥ 0, with its derivatives by s, of the measures in `range`.
     pub fn at(&self, s: f64, range: std::ops::Range<usize>) -> Vec<Jet> {
+        let first = range.start;
         match range.len() {
-            1 => vectorised(Evaluate::<1> { of: self, s, first: range.start }).to_vec(),
-            3 => vectorised(Evaluate::<3> { of: self, s, first: range.start }).to_vec(),
+            1 => vectorised(Evaluate::<1> { of: self, s, first }).to_vec(),
+            3 => vectorised(Evaluate::<3> { of: self, s, first }).to_vec(),
+            4 => vectorised(Evaluate::<4> { of: self, s, first }).to_vec(),
             _ => range.flat_map(|m| vectorised(Evaluate::<1> { of: self, s, first: m })).collect(),
         }
     }
 }
 
-/// Adds samples, measure by measure in registers; `M` = 1 stands for any number.
+/// Adds samples. Those in a row mostly fall into one bin: its moments wait in registers until another bin comes.
 struct Absorb<'a, const M: usize> {
     into: &'a mut Transform,
     x: &'a [f64],
-    values: &'a [Vec<f64>],
+    values: [&'a [f64]; M],
 }
 
 impl<const M: usize> Kernel for Absorb<'_, M> {
@@ -130,25 +151,34 @@ impl<const M: usize> Kernel for Absorb<'_, M> {
 
     #[inline(always)]
     fn run(self) {
-        let measures = if M == 1 { self.values.len() } else { M };
-        let into = self.into;
-        for (i, &x) in self.x.iter().enumerate() {
-            if x == f64::NEG_INFINITY {
-                into.dark.iter_mut().zip(self.values).for_each(|(d, v)| *d += v[i]);
+        let Self { into, x, values } = self;
+        let n = x.len();
+        let values: [&[f64]; M] = std::array::from_fn(|m| &values[m][..n]);
+        let mut held = [[0.0f64; MOMENTS]; M];
+        let (mut bin, mut centre, mut inverse) = (0, 0.0, 0.0);
+        for i in 0..n {
+            if x[i] == f64::NEG_INFINITY {
+                (0..M).for_each(|m| into.dark[m] += values[m][i]);
                 continue;
             }
-            let (bin, centre, half) = bin_of(-x);
-            into.occupied = (into.occupied.0.min(bin), into.occupied.1.max(bin + 1));
-            let powers = powers((centre + x) / half);
-            let block = &mut into.moments[bin * measures * MOMENTS..(bin + 1) * measures * MOMENTS];
-            let (blocks, _) = block.as_chunks_mut::<MOMENTS>();
-            for (moments, values) in blocks.iter_mut().zip(self.values) {
-                let value = values[i];
+            let own = bin_number(-x[i]);
+            if own != bin || inverse == 0.0 {
+                into.flush(bin, &held);
+                held = [[0.0; MOMENTS]; M];
+                bin = own;
+                let half;
+                (centre, half) = bin_geometry(bin);
+                inverse = 1.0 / half;
+            }
+            let powers = powers((centre + x[i]) * inverse);
+            for m in 0..M {
+                let value = values[m][i];
                 for k in 0..MOMENTS {
-                    moments[k] = value.mul_add(powers[k], moments[k]);
+                    held[m][k] = value.mul_add(powers[k], held[m][k]);
                 }
             }
         }
+        into.flush(bin, &held);
     }
 }
 
@@ -269,7 +299,8 @@ mod tests {
     #[test]
     fn bins_hold_what_falls_into_them() {
         for v in [0.0, 1e-20, 6e-14, 1e-9, 0.37, 1.0, 1.0625, 63.9, 745.0, 1e4] {
-            let (bin, centre, half) = bin_of(v);
+            let bin = bin_number(v);
+            let (centre, half) = bin_geometry(bin);
             assert!(bin < BINS && ((v - centre).abs() <= half || v > 1024.0), "{v}: {centre} ± {half}");
             assert!(bin == 0 || half <= centre / 30.0);
         }
