@@ -91,7 +91,7 @@ fn checked_bounds<P: LeastSquares>(problem: &P, start: &DVector<f64>) -> Result<
     if !bounds.is_empty() && bounds.len() != start.len() {
         return Err(SolveError::BoundsCount { found: bounds.len(), expected: start.len() });
     }
-    match bounds.iter().enumerate().find(|(_, (low, high))| !(low <= high)) {
+    match bounds.iter().enumerate().find(|(_, (low, high))| low.is_nan() || high.is_nan() || low > high) {
         Some((index, &(low, high))) => Err(SolveError::Bounds { index, low, high }),
         None => Ok(bounds),
     }

@@ -16,15 +16,15 @@ const COST_IS_BLIND: f64 = 1e-8;
 
 /// Share of a column's scale that one accepted step lets go at most: a column that fades must not let its parameter run away, and one
 /// that was long far from here must not bind its parameter for ever.
-const FADE: f64 = 0.9;
+const FADE: f64 = 0.8;
 
 /// The solver: its options, the ranges of the parameters and the state of one search.
 #[derive(Debug, Clone, Default)]
 pub struct LevenbergMarquardt {
     /// Tolerances and budgets.
     pub options: SolverOptions,
-    pub(super) stop: Option<Stop>,
-    pub(super) history: Vec<Iteration>,
+    stop: Option<Stop>,
+    history: Vec<Iteration>,
     bounds: Bounds,
     here: Option<Local>,
     /// Length of each column, falling no faster than by [`FADE`] a step.
@@ -58,72 +58,30 @@ impl LevenbergMarquardt {
         self
     }
 
-    /// Last accepted point.
+    /// The last accepted point, why it is the last, and how it was reached.
     pub(super) fn into_parts(self) -> (Option<Local>, Option<Stop>, Vec<Iteration>) {
         (self.here, self.stop, self.history)
     }
 
+    /// One step of the search or of the polish; says when all is done.
+    fn advance<O: Linearize>(&mut self, problem: &mut Problem<O>, here: Local) -> Result<Option<Stop>, Error> {
+        if let Some(polish) = self.polish.take() {
+            return self.polish_step(problem, here, polish);
+        }
+        let newton = self.newton(&here);
+        let stationary = self.stationary(&here, &newton);
+        if stationary.is_some() || (self.options.polish > 0 && here.offset(&newton.delta) <= self.polish_below) {
+            self.here = Some(here);
+            return Ok(self.begin_polish(stationary));
+        }
+        let found = self.search(problem, here)?;
+        Ok(if found.is_some() { self.begin_polish(found) } else { None })
+    }
+
+    /// The undamped step of the linear model, in columns of length 1.
     fn newton(&self, at: &Local) -> Step {
         let unit = at.lengths.map(|l| if l > 0.0 { l } else { 1.0 });
         at.step(0.0, &unit, &self.bounds, self.options.rank_tol)
-    }
-
-    /// One damped step that lowers the cost, or the reason why there is none.
-    fn search<O: Linearize>(&mut self, problem: &mut Problem<O>, here: Local) -> Result<Option<Stop>, Error> {
-        loop {
-            let tried = self.radius.step(&here, &self.scale, &self.bounds, self.options.rank_tol);
-            let length = relative_length(&tried.step.delta, &here.p, &self.scale);
-            if !(length > self.options.xtol) {
-                self.here = Some(here);
-                return Ok(Some(Stop::Step { length }));
-            }
-            let predicted = here.predicted(&tried.step.delta);
-            match self.trial(problem, &here, &tried.step)? {
-                Some(next) => {
-                    let ratio = (here.at.cost - next.at.cost) / predicted;
-                    self.radius.update(ratio, &tried);
-                    self.accept(next, tried.damping, length, ratio);
-                    return Ok(None);
-                }
-                None => {
-                    self.radius.update(f64::NAN, &tried);
-                    self.rejected += 1;
-                }
-            }
-        }
-    }
-
-    /// The point that a step leads to, if it is a better one.
-    fn trial<O: Linearize>(&self, problem: &mut Problem<O>, here: &Local, step: &Step) -> Result<Option<Local>, Error> {
-        if !step.to.iter().all(|x| x.is_finite()) {
-            return Ok(None);
-        }
-        let cost = problem.problem("cost_count", |o| o.cost(&step.to))?;
-        if !(cost < here.at.cost) {
-            return Ok(None); // a NaN is no improvement
-        }
-        let at = problem.problem("linearize_count", |o| o.linearize(&step.to))?;
-        Ok(at.is_finite().then(|| Local::new(step.to.clone(), at, &self.bounds)))
-    }
-
-    fn accept(&mut self, next: Local, damping: f64, length: f64, ratio: f64) {
-        self.record(&next, damping, length, ratio);
-        self.scale.zip_apply(&next.lengths, |s, l| *s = larger(FADE * *s, l));
-        self.here = Some(next);
-    }
-
-    fn record(&mut self, at: &Local, damping: f64, length: f64, ratio: f64) {
-        let rank = self.newton(at).rank;
-        self.history.push(Iteration {
-            cost: at.at.cost,
-            parameters: at.p.as_slice().to_vec(),
-            damping,
-            length,
-            cosine: at.largest_cosine(),
-            ratio,
-            rejected: std::mem::take(&mut self.rejected),
-            rank,
-        });
     }
 
     /// Why the model itself says that the search is over.
@@ -136,92 +94,126 @@ impl LevenbergMarquardt {
         (change <= self.options.ftol).then_some(Stop::Cost { change })
     }
 
-    /// A step of the search, or the change to polishing; says when all is done.
-    fn advance<O: Linearize>(&mut self, problem: &mut Problem<O>, here: Local) -> Result<Option<Stop>, Error> {
-        if let Some(polish) = self.polish.take() {
-            return self.polish_step(problem, here, polish);
-        }
-        let newton = self.newton(&here);
-        let stop = self.stationary(&here, &newton);
-        if stop.is_none() && (self.options.polish == 0 || here.offset(&newton.delta) > self.polish_below) {
-            let stop = self.search(problem, here)?;
-            return Ok(if self.options.polish == 0 { stop } else { self.begin_polish(stop) });
-        }
-        self.here = Some(here);
-        if self.options.polish == 0 {
-            Ok(stop)
-        } else {
-            self.polish = None;
-            Ok(self.begin_polish_with(stop, newton))
+    /// One step within the radius that lowers the cost, or the reason why there is none.
+    fn search<O: Linearize>(&mut self, problem: &mut Problem<O>, here: Local) -> Result<Option<Stop>, Error> {
+        loop {
+            let tried = self.radius.step(&here, &self.scale, &self.bounds, self.options.rank_tol);
+            let length = relative_length(&tried.step.delta, &here.p, &self.scale);
+            if length.is_nan() || length <= self.options.xtol {
+                self.here = Some(here);
+                return Ok(Some(Stop::Step { length }));
+            }
+            if let Some(next) = self.trial(problem, &here, &tried.step)? {
+                let ratio = (here.at.cost - next.at.cost) / here.predicted(&tried.step.delta);
+                self.radius.update(Some(ratio), &tried);
+                self.accept(next, tried.damping, length, ratio);
+                return Ok(None);
+            }
+            self.radius.update(None, &tried);
+            self.rejected += 1;
         }
     }
 
+    /// The point that a step leads to, if it is a better one.
+    fn trial<O: Linearize>(&self, problem: &mut Problem<O>, here: &Local, step: &Step) -> Result<Option<Local>, Error> {
+        if !step.to.iter().all(|x| x.is_finite()) {
+            return Ok(None);
+        }
+        let cost = problem.problem("cost_count", |o| o.cost(&step.to))?;
+        if cost.is_nan() || cost >= here.at.cost {
+            return Ok(None);
+        }
+        let at = problem.problem("linearize_count", |o| o.linearize(&step.to))?;
+        Ok(at.is_finite().then(|| Local::new(step.to.clone(), at, &self.bounds)))
+    }
+
+    fn accept(&mut self, next: Local, damping: f64, length: f64, ratio: f64) {
+        self.record(&next, damping, length, ratio);
+        self.scale.zip_apply(&next.lengths, |s, l| *s = larger(FADE * *s, l));
+        self.here = Some(next);
+    }
+
+    fn record(&mut self, at: &Local, damping: f64, length: f64, ratio: f64) {
+        self.history.push(Iteration {
+            cost: at.at.cost,
+            parameters: at.p.as_slice().to_vec(),
+            damping,
+            length,
+            cosine: at.largest_cosine(),
+            ratio,
+            rejected: std::mem::take(&mut self.rejected),
+            rank: self.newton(at).rank,
+        });
+    }
+
+    /// Starts a polish at the current point; what was `found` where there is nothing to polish.
     fn begin_polish(&mut self, found: Option<Stop>) -> Option<Stop> {
         let here = self.here.as_ref()?;
-        if found.is_some() {
-            let newton = self.newton(here);
-            return self.begin_polish_with(found, newton);
-        }
-        None
-    }
-
-    fn begin_polish_with(&mut self, found: Option<Stop>, newton: Step) -> Option<Stop> {
-        let here = self.here.as_ref()?;
-        if here.at.cost <= 0.0 || newton.delta.iter().all(|d| *d == 0.0) {
+        let newton = self.newton(here);
+        if self.options.polish == 0 || here.at.cost <= 0.0 || newton.to == here.p {
             return found.or(Some(Stop::Step { length: 0.0 }));
         }
         self.polish = Some(Polish::new(here, newton, found));
         None
     }
 
-    /// One trial of the polish.
+    /// One trial of the polish: towards the mix of the last points, or plainly where that fails; if that fails too, it is over.
     fn polish_step<O: Linearize>(
         &mut self,
         problem: &mut Problem<O>,
         here: Local,
         mut polish: Polish,
     ) -> Result<Option<Stop>, Error> {
-        let to = self.bounds.project(&polish.proposal(&here));
-        let moves = to != here.p && to.iter().all(|x| x.is_finite());
-        let mut over = !moves;
+        let mut goes_on = true;
         let mut best = here;
-        if moves {
-            polish.tried += 1;
-            let at = problem.problem("linearize_count", |o| o.linearize(&to))?;
-            let trial = Local::new(to, at, &self.bounds);
-            let finite = trial.at.is_finite();
-            let step = if finite { Some(self.newton(&trial)) } else { None };
-            match step.filter(|s| polish.improves(&best, &trial, s)) {
-                Some(step) => {
-                    let delta = &trial.p - &best.p;
-                    let length = relative_length(&delta, &best.p, &self.scale);
-                    let ratio = (best.at.cost - trial.at.cost) / best.predicted(&delta);
-                    self.record(&trial, 0.0, length, ratio);
-                    polish.accept(&trial, step);
-                    best = trial;
-                }
-                None if polish.is_mixing() => polish.forget(),
-                None => over = true,
-            }
+        if let Some((better, step)) = self.polish_trial(problem, &best, &mut polish)? {
+            let delta = &better.p - &best.p;
+            let ratio = (best.at.cost - better.at.cost) / best.predicted(&delta);
+            self.record(&better, 0.0, relative_length(&delta, &best.p, &self.scale), ratio);
+            polish.accept(&better, step);
+            best = better;
         } else if polish.is_mixing() {
             polish.forget();
-            over = false;
+        } else {
+            goes_on = false;
         }
-        over |= polish.tried >= self.options.polish;
         let length = relative_length(&polish.step.delta, &best.p, &self.scale);
         self.here = Some(best);
-        if !over {
+        if goes_on && polish.tried < self.options.polish {
             self.polish = Some(polish);
             return Ok(None);
         }
-        if polish.found.is_none() && polish.offset > COST_IS_BLIND {
-            self.polish_below = 0.01 * self.polish_below;
+        Ok(self.end_polish(&polish, length))
+    }
+
+    fn polish_trial<O: Linearize>(
+        &self,
+        problem: &mut Problem<O>,
+        here: &Local,
+        polish: &mut Polish,
+    ) -> Result<Option<(Local, Step)>, Error> {
+        let to = self.bounds.project(&polish.proposal(here));
+        if to == here.p || !to.iter().all(|x| x.is_finite()) {
             return Ok(None);
         }
-        if polish.accepted > 0 || polish.found.is_none() {
-            return Ok(Some(Stop::Rounding { length, offset: polish.offset }));
+        polish.tried += 1;
+        let at = problem.problem("linearize_count", |o| o.linearize(&to))?;
+        if !at.is_finite() {
+            return Ok(None);
         }
-        Ok(polish.found)
+        let trial = Local::new(to, at, &self.bounds);
+        let step = self.newton(&trial);
+        Ok(polish.improves(here, &trial, &step).then_some((trial, step)))
+    }
+
+    /// What the end of a polish means: the end of all, or that the search must first come closer.
+    fn end_polish(&mut self, polish: &Polish, length: f64) -> Option<Stop> {
+        if polish.found.is_none() && polish.offset > COST_IS_BLIND {
+            self.polish_below *= 0.01;
+            return None;
+        }
+        let rounding = Stop::Rounding { length, offset: polish.offset };
+        if polish.accepted > 0 { Some(rounding) } else { polish.found.or(Some(rounding)) }
     }
 }
 

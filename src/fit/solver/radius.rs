@@ -52,12 +52,12 @@ impl Radius {
         high
     }
 
-    /// Shrinks or grows by how well a step's promise was kept.
-    pub fn update(&mut self, ratio: f64, tried: &Damped) {
-        if !(ratio >= 0.25) {
-            self.0 = 0.25 * tried.length.min(self.0); // NaN comes here: it can't be evaluated so far out
-        } else if ratio >= 0.75 {
-            self.0 = self.0.max(2.0 * tried.length);
+    /// Shrinks or grows by how well a step's promise was kept: `ratio` is the share of it, `None` where the cost did not fall.
+    pub fn update(&mut self, ratio: Option<f64>, tried: &Damped) {
+        match ratio {
+            Some(kept) if kept >= 0.75 => self.0 = self.0.max(2.0 * tried.length),
+            Some(kept) if kept >= 0.25 => {}
+            _ => self.0 = 0.5 * tried.length.min(self.0),
         }
     }
 }
