@@ -255,10 +255,10 @@ fn every_start_reaches_the_certified_values() {
     let count = |k: f64| rows.iter().filter(|r| r.parameters >= k).count();
     let counts: Vec<String> = [4.0, 6.0, 9.0, 10.0].iter().map(|&k| format!(">= {k}: {}", count(k))).collect();
     println!("{} starts by digits of their worst parameter: {}", rows.len(), counts.join(", "));
-    // No set is beyond f64: the worst that rounding the data and the model costs is half a digit of Lanczos1. Its residuals are 1e-13
-    // of data near 1, so that three digits are all that its deviations can have.
+    // No start is beyond f64. Only Lanczos1's deviations are: its residuals are 1e-13 of data near 1, and rounding those data to f64 leaves
+    // 3.4 digits of its certified deviations even in exact arithmetic.
     let fails = |r: &&Row| {
-        let enough = if r.label.starts_with("Lanczos1/") { 2.9 } else { 9.0 };
+        let enough = if r.label.starts_with("Lanczos1/") { 3.0 } else { 9.0 };
         !r.converged || r.parameters < 9.0 || r.deviations < enough
     };
     let failed: Vec<&str> = rows.iter().filter(fails).map(|r| r.label.as_str()).collect();

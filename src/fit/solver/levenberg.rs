@@ -14,6 +14,13 @@ use crate::numeric::float::larger;
 /// Below this relative offset of the undamped step the cost can't tell points apart any more: its change is the offset's square.
 const COST_IS_BLIND: f64 = 1e-8;
 
+/// At a minimum the cost's curvature is positive, so that an undamped step can lower it by twice what it promised at most. A short step
+/// that lowers it by more has found rounding, and following that would choose the point where rounding happens to be kindest.
+const ROUNDING_RATIO: f64 = 4.0;
+
+/// Relative length below which an undamped step counts as short.
+const SHORT: f64 = 1e-6;
+
 /// Share of a column's scale that one accepted step lets go at most: a column that fades must not let its parameter run away, and one
 /// that was long far from here must not bind its parameter for ever.
 const FADE: f64 = 0.8;
@@ -104,7 +111,13 @@ impl LevenbergMarquardt {
                 return Ok(Some(Stop::Step { length }));
             }
             if let Some(next) = self.trial(problem, &here, &tried.step)? {
-                let ratio = (here.at.cost - next.at.cost) / here.predicted(&tried.step.delta);
+                let predicted = here.predicted(&tried.step.delta);
+                let ratio = (here.at.cost - next.at.cost) / predicted;
+                if tried.damping == 0.0 && length < SHORT && ratio > ROUNDING_RATIO {
+                    let change = predicted / here.at.cost;
+                    self.here = Some(here);
+                    return Ok(Some(Stop::Cost { change }));
+                }
                 self.radius.update(Some(ratio), &tried);
                 self.accept(next, tried.damping, length, ratio);
                 return Ok(None);
