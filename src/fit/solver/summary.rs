@@ -8,7 +8,8 @@ pub enum Stop {
         /// Largest cosine.
         cosine: f64,
     },
-    /// The best step of the linear model would lower the cost by no more than the share `change` of it.
+    /// The best step of the linear model would lower the cost by no more than the share `change` of it, or a short one lowered it by
+    /// more than any curvature allows: what is left is rounding.
     Cost {
         /// Share predicted.
         change: f64,
