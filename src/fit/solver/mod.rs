@@ -1,0 +1,99 @@
+//! Levenberg–Marquardt for any least-squares problem, as an argmin [`Solver`](argmin::core::Solver).
+//!
+//! In: a problem that gives its residuals and Jacobian ([`LeastSquares`]), or one that reduces both itself ([`Linearize`], for problems
+//! too large to hold a Jacobian). Out: the parameters, why the search stopped, what each step did and, from [`solve`], rank and standard
+//! errors. The one decision to know: the search (Moré's trust region, 1978) accepts steps by the cost, and the last digits, where the
+//! cost no longer tells points apart, are won by undamped steps accepted by the length of the step that follows. Costs are Σ r² (no ½).
+//!
+//! ```
+//! use goniofit::fit::solver::{Error, LeastSquares, SolverOptions, solve};
+//! use nalgebra::{DMatrix, DVector};
+//!
+//! /// y = a exp(−b x)
+//! struct Decay {
+//!     x: Vec<f64>,
+//!     y: Vec<f64>,
+//! }
+//!
+//! impl LeastSquares for Decay {
+//!     fn residuals(&self, p: &DVector<f64>) -> Result<DVector<f64>, Error> {
+//!         let r = self.x.iter().zip(&self.y).map(|(x, y)| p[0] * (-p[1] * x).exp() - y);
+//!         Ok(DVector::from_iterator(self.y.len(), r))
+//!     }
+//!
+//!     fn jacobian(&self, p: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
+//!         Ok(DMatrix::from_fn(self.x.len(), 2, |i, j| {
+//!             let e = (-p[1] * self.x[i]).exp();
+//!             if j == 0 { e } else { -p[0] * self.x[i] * e }
+//!         }))
+//!     }
+//! }
+//!
+//! let data = Decay { x: vec![0.0, 1.0, 2.0, 3.0, 4.0], y: vec![2.03, 1.19, 0.75, 0.43, 0.28] };
+//! let fit = solve(&data, DVector::from_vec(vec![1.0, 1.0]), &SolverOptions::default())?;
+//! assert!(fit.converged() && fit.rank == 2);
+//! for (value, error) in fit.parameters.iter().zip(&fit.standard_errors) {
+//!     println!("{value} ± {}", error.unwrap_or(f64::NAN));
+//! }
+//! # assert!((fit.parameters[0] - 2.0).abs() < 0.1 && (fit.parameters[1] - 0.5).abs() < 0.05);
+//! # Ok::<(), goniofit::fit::solver::SolveError>(())
+//! ```
+
+mod error;
+mod least_squares;
+mod levenberg;
+mod linearize;
+mod local;
+mod options;
+mod polish;
+mod qr;
+mod radius;
+mod summary;
+#[cfg(test)]
+mod tests;
+
+use argmin::core::Executor;
+use nalgebra::DVector;
+
+pub use argmin::core::Error;
+pub use error::SolveError;
+pub use least_squares::{LeastSquares, Solution, solve};
+pub use levenberg::LevenbergMarquardt;
+pub use linearize::{Linearization, Linearize};
+pub use options::SolverOptions;
+pub use summary::{Iteration, Stop};
+
+/// Where a minimisation ended.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The parameters.
+    pub t: DVector<f64>,
+    /// Σ r² there.
+    pub cost: f64,
+    /// Why it ended.
+    pub stop: Stop,
+    /// The start and every accepted step.
+    pub history: Vec<Iteration>,
+}
+
+/// Runs the solver from `start` for at most `max_iterations` steps. With no parameters there is nothing to search.
+///
+/// # Errors
+/// What the problem's evaluation returns.
+pub fn minimize<O: Linearize>(
+    problem: O,
+    solver: LevenbergMarquardt,
+    start: DVector<f64>,
+    max_iterations: u64,
+) -> Result<Outcome, Error> {
+    if start.is_empty() {
+        let cost = problem.cost(&start)?;
+        return Ok(Outcome { t: start, cost, stop: Stop::Gradient { cosine: 0.0 }, history: Vec::new() });
+    }
+    let configure =
+        |state: argmin::core::IterState<_, (), (), (), (), f64>| state.param(start).max_iters(max_iterations);
+    let result = Executor::new(problem, solver).configure(configure).run()?;
+    let (here, stop, history) = result.solver.into_parts();
+    let here = here.ok_or_else(|| Error::msg("the solver lost its point"))?;
+    Ok(Outcome { t: here.p, cost: here.at.cost, stop: stop.unwrap_or(Stop::MaxIterations), history })
+}
