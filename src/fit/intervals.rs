@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::covariance::{Interval, Uncertainty};
 use super::reduced::{Problem, Search, Solution};
-use super::solver::{self, LevenbergMarquardt};
+use super::solver::{self, LevenbergMarquardt, SolverOptions};
 
 /// Intervals of all parameters, in the uncertainty's order: weights in the fit's scale, shapes as t = ln(shape).
 pub(super) type Intervals = Vec<Option<Interval>>;
@@ -89,8 +89,8 @@ impl Profile<'_> {
             start[self.parameter - weights] = value;
         }
         let search = self.search.of(&held);
-        let mut lm = LevenbergMarquardt::bounded(held.bounds.clone());
-        lm.ftol = 1e-10;
+        let options = SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() };
+        let lm = LevenbergMarquardt::new(options).with_bounds(held.bounds.clone());
         let found = solver::minimize(&search, lm, start, 30);
         found.map_or(f64::NAN, |f| (f.cost - self.at.cost.max(0.0)) / self.rise - 1.0)
     }
