@@ -54,7 +54,12 @@ impl Scratch {
         for (lobe, phi) in lobes.iter().zip(values) {
             let own = &mut derivatives[next..next + lobe.shape.len()];
             next += lobe.shape.len();
-            lobe.kind.lobe().fill(&lobe.shape, &block.x, phi, own);
+            if own.is_empty() {
+                // A lobe without a shape is the same wherever both directions are above the horizon, as all samples' are.
+                phi.fill(lobe.kind.lobe().value(&[], 0.0, &mut []));
+            } else {
+                lobe.kind.lobe().fill(&lobe.shape, &block.x, phi, own);
+            }
             for (list, s) in own.iter_mut().zip(&lobe.shape) {
                 vectorised(Scale(list, *s));
             }

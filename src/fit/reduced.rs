@@ -427,70 +427,88 @@ impl Linearize for Streamed<'_> {
 
 /// A lobe whose share of a channel's root-sum-square is below this is rounding: 16 units in the last place.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// Polishing steps at most.
-const POLISH_STEPS: usize = 12;
+/// Polishing passes at most.
+const POLISH_PASSES: usize = 40;
+/// Share of the cost below which a step no longer pays.
+const PAYS: f64 = 1e-12;
 
-/// Gauss–Newton steps in weights and shapes together, on true residuals, from a point that the transforms found: wins back the
-/// digits that the difference of sums loses. The matrix stays that of the start. The best point seen is kept.
+/// Damped Gauss–Newton steps in weights and shapes together, on true residuals, from a point that the transforms found: wins back the
+/// digits that the difference of sums loses. The best point seen is kept.
 pub(super) fn polish(search: &Search<'_>, start: Solution) -> Solution {
     let problem = search.problem;
-    let (k, p) = (problem.kinds.len(), problem.layout.len());
-    let moments = search.moments(&start.lobes, true);
+    let evaluate = |s: &Solution| passes::sums(problem.samples, &s.lobes, &s.weights, None, Want::Gradient);
     let mut at = start;
+    let mut moments = search.moments(&at.lobes, true);
+    drop_rounding(search, &moments, &mut at);
+    let mut sums = evaluate(&at);
+    at.cost = sums.iter().map(|s| s.cost).sum();
+    let mut damping = 0.0;
+    for _ in 0..POLISH_PASSES {
+        let mut next = joint_step(problem, &moments, &at, &sums, damping);
+        let found = evaluate(&next);
+        next.cost = found.iter().map(|s| s.cost).sum();
+        if next.cost < at.cost {
+            let won = 1.0 - next.cost / at.cost;
+            (at, sums) = (next, found);
+            if won < PAYS {
+                break;
+            }
+            damping = if damping > 1e-9 { 0.1 * damping } else { 0.0 };
+            moments = search.moments(&at.lobes, true);
+        } else if damping > 1.0 {
+            break;
+        } else {
+            damping = (20.0 * damping).max(1e-10);
+        }
+    }
+    at
+}
+
+/// Weights that are nothing but rounding are 0.
+fn drop_rounding(search: &Search<'_>, moments: &Moments, at: &mut Solution) {
     for (c, x) in at.weights.iter_mut().enumerate() {
         let floor = ROUNDING * search.energy[c].sqrt();
-        for l in 0..k {
-            if x[l] * moments.gram(c)[(l, l)].sqrt() <= floor && problem.ranges[c][l].0 == 0.0 {
+        for l in 0..x.len() {
+            let free = search.problem.ranges[c][l].0 == 0.0;
+            if free && x[l] * moments.gram(c)[(l, l)].sqrt() <= floor {
                 x[l] = 0.0;
             }
         }
     }
-    let evaluate = |s: &Solution| passes::sums(problem.samples, &s.lobes, &s.weights, None, Want::Gradient);
-    let mut sums = evaluate(&at);
-    at.cost = sums.iter().map(|s| s.cost).sum();
-    for _ in 0..POLISH_STEPS {
-        let gradient = |c: usize| sums[c].gradient.rows(0, k).into_owned();
-        let pull = |c: usize| sums[c].gradient.rows(k, p).into_owned();
-        // What is left of the gradient by t once the weights have followed theirs.
-        let (normal, mut by_t) = problem.reduce(&at.weights, |c| moments.gram(c).clone(), pull);
-        let mut own = Vec::new();
-        for (c, x) in at.weights.iter().enumerate() {
-            let rhs = DMatrix::from_column_slice(k, 1, gradient(c).as_slice());
-            let moved = problem.follow(c, x, moments.gram(c), &rhs).column(0).into_owned();
-            let strength = DVector::from_fn(p, |i, _| x[problem.layout[i].0]);
-            by_t -= (moments.gram(c).view((k, 0), (p, k)) * &moved).component_mul(&strength);
-            own.push(moved);
-        }
-        let held = |i: usize| {
-            let (low, high) = problem.bounds[i];
-            low == high || (at.t[i] <= low && by_t[i] > 0.0) || (at.t[i] >= high && by_t[i] < 0.0)
-        };
-        let free: Vec<usize> = (0..p).filter(|&i| !held(i)).collect();
-        let solved = solve_free(&normal.select_rows(&free).select_columns(&free), &by_t.select_rows(&free));
-        let mut step = DVector::zeros(p);
-        free.iter().zip(solved.iter()).for_each(|(&i, v)| step[i] = -v);
-        let t: Vec<f64> = (0..p).map(|i| (at.t[i] + step[i]).clamp(problem.bounds[i].0, problem.bounds[i].1)).collect();
-        let weights = (0..at.weights.len())
-            .map(|c| {
-                let x = &at.weights[c];
-                let strength = DMatrix::from_diagonal(&DVector::from_fn(p, |i, _| x[problem.layout[i].0]));
-                let cross = moments.gram(c).view((0, k), (k, p)) * strength * &step;
-                let also = problem.follow(c, x, moments.gram(c), &DMatrix::from_column_slice(k, 1, cross.as_slice()));
-                let next = x - &own[c] - also.column(0);
-                DVector::from_fn(k, |l, _| next[l].clamp(problem.ranges[c][l].0, problem.ranges[c][l].1))
-            })
-            .collect();
-        let mut next = Solution { lobes: problem.shaped(&t), t, weights, cost: 0.0 };
-        let found = evaluate(&next);
-        next.cost = found.iter().map(|s| s.cost).sum();
-        if !(next.cost < at.cost) {
-            break;
-        }
-        let won = 1.0 - next.cost / at.cost;
-        (at, sums) = (next, found);
-        if won < 1e-12 {
-            break;
-        }
+}
+
+/// The step in all parameters from the sums of true residuals, its part in the shapes damped by a share of their matrix's diagonal.
+fn joint_step(problem: &Problem<'_>, moments: &Moments, at: &Solution, sums: &[Sums], damping: f64) -> Solution {
+    let (k, p) = (problem.kinds.len(), problem.layout.len());
+    let pull = |c: usize| sums[c].gradient.rows(k, p).into_owned();
+    let (mut normal, mut by_t) = problem.reduce(&at.weights, |c| moments.gram(c).clone(), pull);
+    let strength = |x: &DVector<f64>| DVector::from_fn(p, |i, _| x[problem.layout[i].0]);
+    // What the weights do by themselves, and what is then left of the gradient by t.
+    let mut own = Vec::new();
+    for (c, x) in at.weights.iter().enumerate() {
+        let rhs = DMatrix::from_column_slice(k, 1, sums[c].gradient.rows(0, k).into_owned().as_slice());
+        let moved = problem.follow(c, x, moments.gram(c), &rhs).column(0).into_owned();
+        by_t -= (moments.gram(c).view((k, 0), (p, k)) * &moved).component_mul(&strength(x));
+        own.push(moved);
     }
-    at
+    for i in 0..p {
+        normal[(i, i)] *= 1.0 + damping;
+    }
+    let held = |i: usize| {
+        let (low, high) = problem.bounds[i];
+        low == high || (at.t[i] <= low && by_t[i] > 0.0) || (at.t[i] >= high && by_t[i] < 0.0)
+    };
+    let free: Vec<usize> = (0..p).filter(|&i| !held(i)).collect();
+    let solved = solve_free(&normal.select_rows(&free).select_columns(&free), &by_t.select_rows(&free));
+    let mut t = at.t.clone();
+    free.iter().zip(solved.iter()).for_each(|(&i, v)| t[i] = (t[i] - v).clamp(problem.bounds[i].0, problem.bounds[i].1));
+    let step = DVector::from_fn(p, |i, _| t[i] - at.t[i]);
+    let follow = |(c, x): (usize, &DVector<f64>)| {
+        let cross = moments.gram(c).view((0, k), (k, p)) * step.component_mul(&strength(x));
+        let also = problem.follow(c, x, moments.gram(c), &DMatrix::from_column_slice(k, 1, cross.as_slice()));
+        let next = x - &own[c] - also.column(0);
+        DVector::from_fn(k, |l, _| next[l].clamp(problem.ranges[c][l].0, problem.ranges[c][l].1))
+    };
+    let weights = at.weights.iter().enumerate().map(follow).collect();
+    Solution { lobes: problem.shaped(&t), t, weights, cost: f64::NAN }
 }

@@ -8,7 +8,7 @@ use super::options::FitError;
 use super::passes::ShapedLobe;
 use super::quadratic::{self, Feasible};
 use super::reduced::{Problem, Search, Streamed};
-use super::solver::{self, Linearize, Outcome};
+use super::solver::{self, LevenbergMarquardt, Linearize, Outcome, SolverOptions};
 use crate::numeric::random::{Purpose, RngExt, stream};
 
 /// Combinations of nodes kept while lobes are added one by one.
@@ -98,6 +98,10 @@ impl Nodes {
 
 /// The lowest minimum of a problem that the transforms know.
 pub(super) fn search(search: &Search<'_>, steps: u64) -> Result<Found, FitError> {
+    search_with(search, steps, RANDOM_STARTS)
+}
+
+fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, FitError> {
     let problem = search.problem;
     let mut starts = match problem.layout.len() {
         0 => vec![Vec::new()],
@@ -108,9 +112,16 @@ pub(super) fn search(search: &Search<'_>, steps: u64) -> Result<Found, FitError>
             nodes.combinations(|set| lattice.cost(problem, set))
         }
     };
+    if problem.layout.len() > 1 {
+        // A lobe more can only help: from the smaller model's optimum the larger one never ends above it.
+        let smaller = problem.with_shapes(problem.layout.len() - 1);
+        let found = search_with(&search.of(&smaller), steps, 0)?;
+        let cost = |t: &[f64]| search.solve(t).cost;
+        starts.push(extended(problem, found.outcome.t.as_slice(), cost));
+    }
     let lattice = starts.len();
     if problem.layout.len() > 1 {
-        starts.extend(drawn(problem, RANDOM_STARTS));
+        starts.extend(drawn(problem, random));
     }
     let run = |start: &Vec<f64>| polish_start(search, problem, start.clone(), steps);
     let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
@@ -139,8 +150,21 @@ pub(super) fn search_streamed(problem: &Problem<'_>, steps: u64) -> Result<Found
 }
 
 fn polish_start(at: impl Linearize, problem: &Problem<'_>, start: Vec<f64>, steps: u64) -> Result<Outcome, FitError> {
-    let lm = solver::LevenbergMarquardt::bounded(problem.bounds.clone());
+    // The last digits are won on true residuals, not here.
+    let options = SolverOptions { ftol: 1e-13, polish: 0, ..SolverOptions::default() };
+    let lm = LevenbergMarquardt::new(options).with_bounds(problem.bounds.clone());
     solver::minimize(at, lm, DVector::from_vec(start), steps).map_err(|e| FitError::Solver { reason: e.to_string() })
+}
+
+/// A smaller model's optimum with one lobe more, where that helps most among the last shape's nodes.
+fn extended(problem: &Problem<'_>, smaller: &[f64], cost: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
+    let nodes = Nodes::new(problem);
+    let last = nodes.of.last().map_or(&[][..], Vec::as_slice);
+    let tried = last.par_iter().map(|&k| {
+        let t: Vec<f64> = smaller.iter().copied().chain([nodes.t[k]]).collect();
+        (cost(&t), t)
+    });
+    tried.min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| smaller.to_vec(), |(_, t)| t)
 }
 
 /// Shapes drawn evenly on the logarithmic scale.
