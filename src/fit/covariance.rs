@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::loss::Datum;
 use super::passes::{Moments, Projected, Scratch};
 use super::reduced::{Problem, Solution};
-use super::samples::{Block, PIECES};
+use super::samples::Block;
 use super::structure::Neighbours;
 use crate::numeric::simd::{Kernel, dot, vectorised};
 use crate::numeric::stats::student_quantile;
@@ -74,7 +74,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let freedom = n as f64 - parameters as f64;
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
     let start = || Part::new(problem, at);
-    let parts = samples.map_pieces(PIECES, start, |part, block| part.add(problem, at, block, moments.is_none()));
+    let add = |part: &mut Part, block: &Block| part.add(problem, at, block, moments.is_none());
+    let parts = if moments.is_some() { samples.map_folded(start, add) } else { samples.map_pieces(start, add) };
 
     let (mut normal, mut spread) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
     let mut clusters = DMatrix::zeros(parameters, parameters);
@@ -242,6 +243,10 @@ impl Part {
             let (w, pairs) = (block.weight(c), &block.pairs);
             sums.neighbours.add(&Neighbours::of(&scratch.r, &scratch.trust, w, pairs));
             sums.dark |= vectorised(Dark(&block.x, w)) > 0.0;
+            if let Some(other) = &block.swapped {
+                sums.neighbours.add(&Neighbours::of(&scratch.swapped[0], &[], other.weight(c), pairs));
+                sums.dark |= vectorised(Dark(&block.x, other.weight(c))) > 0.0;
+            }
             let gradient = sums.add(problem, block, c, scratch, bread);
             let (strength, place) = (strength(problem, x), place(problem, channels, c));
             if clusters.len() == 1 {
@@ -307,7 +312,7 @@ impl ChannelSums {
         let (k, w) = (scratch.columns.len(), block.weight(channel));
         let mut gradient = DVector::zeros(k);
         if bread {
-            scratch.curvature(w);
+            scratch.curvature(block, channel);
             if let Some((kind, s)) = problem.saturation {
                 // How the pull itself grows with the residual.
                 let growth = |i: usize| w[i] * scratch.slope[i].powi(2) * kind.rho((scratch.r[i] / s).powi(2)).2;
@@ -317,8 +322,7 @@ impl ChannelSums {
             gradient.fill(0.0);
         }
         let data_slopes = data_slopes(problem, block, channel, &scratch.f);
-        scratch.weight.resize(w.len(), 0.0);
-        vectorised(Square(&scratch.pull, &mut scratch.weight));
+        scratch.squared_pull(block);
         if let Some(sigma) = measurement.sigma_plane(own) {
             let known = self.stated(block, w, &data_slopes, sigma);
             if problem.saturation.is_none() {
@@ -331,6 +335,7 @@ impl ChannelSums {
                 gradient.fill(0.0);
             }
         }
+        scratch.join_pull(block);
         scratch.tally(k, &mut gradient, &mut self.spread);
         for (component, total) in self.common.iter_mut().enumerate() {
             let u = measurement.common_plane(component, own);
@@ -357,17 +362,6 @@ impl ChannelSums {
             self.stated.1 += usize::from(s.is_some());
         }
         known
-    }
-}
-
-struct Square<'a>(&'a [f64], &'a mut [f64]);
-
-impl Kernel for Square<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.1.iter_mut().zip(self.0).for_each(|(to, v)| *to = v * v);
     }
 }
 

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::samples::Block;
 use crate::geometry::HalfDiff;
 use crate::measurement::{MerlAngles, MerlGrid};
-use crate::numeric::simd::{Kernel, dot, ln_1p, vectorised};
+use crate::numeric::simd::{Kernel, dot, ln_1p, map, vectorised};
 
 /// Lines of a block: it fixes how sums are bracketed, so it must not depend on the number of threads.
 const LINES: usize = 5;
@@ -86,19 +86,26 @@ impl MerlLines {
         Some(Line { first, bins: start..end, weight, theta_h, theta_d })
     }
 
-    /// Appends cosθi and ln cosα of a line to a block.
-    pub fn append(&self, line: &Line, block: &mut Block) {
+    /// Appends cosθi and 1 − cosα of a line to a block ([`finish`] makes it ln cosα); to a folded one, of the near half and its
+    /// partners.
+    pub fn append(&self, line: &Line, block: &mut Block) -> Option<Fold> {
         let (a, b) = (line.theta_h.1 * line.theta_d.1, line.theta_h.0 * line.theta_d.0);
-        let cos_phi = &self.cos_phi[line.bins.clone()];
+        let fold = block.swapped.is_some().then(|| self.fold(line));
+        let cos_phi = &self.cos_phi[line.bins.clone()][..fold.map_or(line.bins.len(), Fold::len)];
         block.cos_i.extend(cos_phi.iter().map(|cos| a - b * cos));
+        if let Some(swapped) = &mut block.swapped {
+            swapped.cos_i.extend(cos_phi.iter().map(|cos| a + b * cos));
+        }
         let start = block.x.len();
         block.x.resize(start + cos_phi.len(), 0.0);
-        vectorised(LnCosAlpha {
-            twice_sin_h_squared: 2.0 * line.theta_h.0 * line.theta_h.0,
-            sin_d_squared: line.theta_d.0 * line.theta_d.0,
-            sin_phi_squared: &self.sin_phi_squared[line.bins.clone()],
-            out: &mut block.x[start..],
-        });
+        let end = line.bins.start + cos_phi.len();
+        versines(line, &self.sin_phi_squared[line.bins.start..end], &mut block.x[start..]);
+        fold
+    }
+
+    #[inline(always)]
+    fn fold(&self, line: &Line) -> Fold {
+        Fold::of(line.bins.len(), self.edge && line.bins.start == 0)
     }
 }
 
@@ -148,8 +155,17 @@ impl<const M: usize> Seen<M> {
     }
 }
 
-/// Room for a line.
-type Row = [f64; MerlGrid::PHI_D];
+/// Room for a line, with some to spare: lists of a multiple of 32 go through the vector units without a remainder.
+const ROOM: usize = 192;
+type Row = [f64; ROOM];
+
+/// A line's values, padded by `filler`.
+#[inline(always)]
+fn padded(values: &[f64], filler: f64) -> Row {
+    let mut row = [filler; ROOM];
+    row[..values.len()].copy_from_slice(values);
+    row
+}
 
 impl<const M: usize> Kernel for Folded<'_, M> {
     type Output = ();
@@ -159,51 +175,44 @@ impl<const M: usize> Kernel for Folded<'_, M> {
         let line = self.line;
         let (n, w) = (line.bins.len(), line.weight);
         let (a, b) = (line.theta_h.1 * line.theta_d.1, line.theta_h.0 * line.theta_d.0);
-        let fold = Fold::of(n, self.lines.edge && line.bins.start == 0);
-        let cos_phi = &self.lines.cos_phi[line.bins.clone()][..n];
-        let first = &self.values[0][..n];
-        let (mut omega, mut valid, mut y, mut product) = (ROW, ROW, ROW, ROW);
-        for i in 0..n {
-            let g = if self.cosine { a - b * cos_phi[i] } else { 1.0 };
-            valid[i] = if first[i].is_nan() { 0.0 } else { 1.0 };
-            omega[i] = w * g * g * valid[i];
+        let fold = self.lines.fold(line);
+        let m = n.next_multiple_of(32);
+        let cos_phi = padded(&self.lines.cos_phi[line.bins.clone()], 0.0);
+        let first = padded(self.values[0], f64::NAN);
+        let (mut omega, mut valid, mut y, mut product) = ([0.0; ROOM], [0.0; ROOM], [0.0; ROOM], [0.0; ROOM]);
+        map(&first[..m], &first[..m], &mut valid[..m], |v, _| if v.is_nan() { 0.0 } else { 1.0 });
+        if self.cosine {
+            let gain = |cos: f64| a - b * cos;
+            map(&cos_phi[..m], &valid[..m], &mut omega[..m], |cos, valid| w * gain(cos) * gain(cos) * valid);
+        } else {
+            map(&valid[..m], &valid[..m], &mut omega[..m], |valid, _| w * valid);
         }
-        let count = dot(&valid[..n], &valid[..n]);
+        let count = dot(&valid[..m], &valid[..m]);
         self.seen.count += count;
         self.seen.weight += w * count;
         fold.apply(&omega, &mut self.sums[0]);
-        for m in 0..M {
-            let values = &self.values[m][..n];
-            for i in 0..n {
-                let known = if values[i].is_nan() { 0.0 } else { 1.0 };
-                product[i] = known - valid[i];
-                y[i] = if values[i].is_nan() { 0.0 } else { values[i] };
-            }
-            self.seen.unlike += dot(&product[..n], &product[..n]);
-            for i in 0..n {
-                product[i] = omega[i] * y[i];
-            }
-            self.seen.energy[m] += dot(&product[..n], &y[..n]);
-            self.seen.largest = largest(&y[..n], self.seen.largest);
-            fold.apply(&product, &mut self.sums[1 + m]);
+        for c in 0..M {
+            let values = padded(self.values[c], f64::NAN);
+            map(&values[..m], &valid[..m], &mut product[..m], |v, valid| if v.is_nan() { valid } else { 1.0 - valid });
+            self.seen.unlike += dot(&product[..m], &product[..m]);
+            map(&values[..m], &values[..m], &mut y[..m], |v, _| if v.is_nan() { 0.0 } else { v });
+            map(&omega[..m], &y[..m], &mut product[..m], |omega, y| omega * y);
+            self.seen.energy[c] += dot(&product[..m], &y[..m]);
+            self.seen.largest = largest(&y[..m], self.seen.largest);
+            fold.apply(&product, &mut self.sums[1 + c]);
         }
-        let sin_phi_squared = &self.lines.sin_phi_squared[line.bins.clone()][..fold.len()];
-        self.x.resize(fold.len(), 0.0);
-        LnCosAlpha {
-            twice_sin_h_squared: 2.0 * line.theta_h.0 * line.theta_h.0,
-            sin_d_squared: line.theta_d.0 * line.theta_d.0,
-            sin_phi_squared,
-            out: self.x,
-        }
-        .run();
+        let half = fold.len().next_multiple_of(32);
+        let squares = padded(&self.lines.sin_phi_squared[line.bins.start..line.bins.start + fold.len()], 0.0);
+        versines(line, &squares[..half], &mut product[..half]);
+        ln_cosines(&mut product[..half]);
+        self.x.clear();
+        self.x.extend_from_slice(&product[..fold.len()]);
     }
 }
 
-const ROW: Row = [0.0; MerlGrid::PHI_D];
-
 /// How a line folds about φd = 90°.
 #[derive(Debug, Clone, Copy)]
-struct Fold {
+pub(super) struct Fold {
     /// Samples of the line.
     n: usize,
     /// Whether the first has no partner: the lower edge of the first bin, whose partner would lie at 180°.
@@ -220,8 +229,18 @@ impl Fold {
 
     /// Samples left: the pairs, the one alone, and the middle where there is one.
     #[inline(always)]
-    fn len(self) -> usize {
+    pub fn len(self) -> usize {
         self.n - self.pairs
+    }
+
+    /// Which of the samples left have a partner.
+    pub fn partners(self) -> std::ops::Range<usize> {
+        self.alone..self.alone + self.pairs
+    }
+
+    /// The partners on the line, in reverse order.
+    pub fn far(self) -> std::ops::Range<usize> {
+        self.n - self.pairs..self.n
     }
 
     #[inline(always)]
@@ -250,27 +269,38 @@ fn largest(y: &[f64], start: f64) -> f64 {
     lanes.iter().copied().chain(rest.iter().map(|y| y.abs())).fold(start, f64::max)
 }
 
-/// ln cosα of a line: 1 − cosα = 2 sin²θh (1 − sin²θd sin²φd), small differences of which keep their digits.
-struct LnCosAlpha<'a> {
-    twice_sin_h_squared: f64,
-    sin_d_squared: f64,
-    sin_phi_squared: &'a [f64],
-    out: &'a mut [f64],
+/// 1 − cosα = 2 sin²θh (1 − sin²θd sin²φd) of a line: small differences keep their digits.
+#[inline(always)]
+fn versines(line: &Line, sin_phi_squared: &[f64], out: &mut [f64]) {
+    let (twice_h, d) = (2.0 * line.theta_h.0 * line.theta_h.0, line.theta_d.0 * line.theta_d.0);
+    map(sin_phi_squared, sin_phi_squared, out, |s, _| twice_h * d.mul_add(-s, 1.0));
 }
 
-impl Kernel for LnCosAlpha<'_> {
+/// ln cosα from 1 − cosα.
+#[inline(always)]
+fn ln_cosines(versines: &mut [f64]) {
+    for x in versines {
+        // Where cosα ≤ 0 the logarithm is of some positive number and not used.
+        let inside = *x < 1.0;
+        let ln = ln_1p(if inside { -*x } else { 0.0 });
+        *x = if inside { ln } else { f64::NEG_INFINITY };
+    }
+}
+
+struct LnCosines<'a>(&'a mut [f64]);
+
+impl Kernel for LnCosines<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        for (x, s) in self.out.iter_mut().zip(self.sin_phi_squared) {
-            let versine = self.twice_sin_h_squared * self.sin_d_squared.mul_add(-s, 1.0);
-            // Where cosα ≤ 0 the logarithm is of some positive number and not used.
-            let inside = versine < 1.0;
-            let ln = ln_1p(if inside { -versine } else { 0.0 });
-            *x = if inside { ln } else { f64::NEG_INFINITY };
-        }
+        ln_cosines(self.0);
     }
+}
+
+/// ln cosα of a block whose coordinates are 1 − cosα so far.
+pub(super) fn finish(block: &mut Block) {
+    vectorised(LnCosines(&mut block.x));
 }
 
 #[cfg(test)]
@@ -290,6 +320,7 @@ mod tests {
                     for line in lines.lines(b) {
                         let mut block = Block::default();
                         lines.append(&line, &mut block);
+                        finish(&mut block);
                         for (k, entry) in line.entries().enumerate() {
                             let (wi, wo) = grid.pair(entry);
                             assert!((block.cos_i[k] - wi.z).abs() < 1e-15);

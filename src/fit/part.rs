@@ -6,7 +6,7 @@ use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
 use super::passes::{self, Saturation, Scratch};
 use super::reduced::{Problem, Search, Solution, Streamed, polish};
-use super::samples::{PIECES, Samples, Transforms};
+use super::samples::{Samples, Transforms};
 use super::solver::{self, Iteration, LevenbergMarquardt, Stop};
 use super::start::{self, SearchReport};
 use super::structure::{self, Structure};
@@ -146,7 +146,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
 /// that still is a scale.
 fn spread(problem: &Problem<'_>, at: &Solution) -> f64 {
     let samples = problem.samples;
-    let pieces = samples.map_pieces(PIECES, || (Vec::new(), Scratch::default()), |(list, scratch), block| {
+    let pieces = samples.map_pieces(|| (Vec::new(), Scratch::default()), |(list, scratch), block| {
         scratch.basis(block, &at.lobes);
         for (c, x) in at.weights.iter().enumerate() {
             scratch.residuals(samples, block, c, x, None);

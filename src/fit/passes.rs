@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::loss::{Loss, Robust, RobustKind};
-use super::samples::{Block, PIECES, Samples, Transforms};
+use super::samples::{Block, Samples, Transforms};
 use super::transform::Transform;
 use crate::brdf::LobeKind;
 use crate::numeric::simd::{Kernel, dot, dot3, vectorised};
@@ -41,6 +41,8 @@ pub(super) struct Scratch {
     pub pull: Vec<f64>,
     /// What products of columns are weighted by.
     pub weight: Vec<f64>,
+    /// r, ∂r/∂f and pull of the partners, where the block is folded.
+    pub swapped: [Vec<f64>; 3],
 }
 
 impl Scratch {
@@ -79,12 +81,18 @@ impl Scratch {
         let n = block.len();
         [&mut self.f, &mut self.r, &mut self.slope, &mut self.pull].into_iter().for_each(|l| l.resize(n, 0.0));
         vectorised(Model { phi: &self.columns[..x.len()], x: x.as_slice(), f: &mut self.f });
-        samples.gain(block, channel, &mut self.slope);
         let (w, y) = (block.weight(channel), &block.y[channel]);
+        samples.gain(&block.cos_i, y, channel, &mut self.slope);
         if samples.loss.is_linear() && saturation.is_none() {
             self.trust.clear();
             let (r, pull) = (&mut self.r, &mut self.pull);
-            return vectorised(Linear { f: &self.f, y, w, gain: &self.slope, r, pull });
+            let cost = vectorised(Linear { f: &self.f, y, w, gain: &self.slope, r, pull });
+            let Some(other) = &block.swapped else { return cost };
+            let [r, slope, pull] = &mut self.swapped;
+            [&mut *r, slope, pull].into_iter().for_each(|l| l.resize(n, 0.0));
+            let (w, y) = (other.weight(channel), &other.y[channel]);
+            samples.gain(&other.cos_i, y, channel, slope);
+            return cost + vectorised(Linear { f: &self.f, y, w, gain: slope, r, pull });
         }
         let targets: Vec<f64> = if samples.loss.is_linear() {
             y.clone()
@@ -98,15 +106,36 @@ impl Scratch {
         vectorised(Evaluate { loss: samples.loss, saturation, data, out })
     }
 
-    /// Fills the weight with w ρ′ (∂r/∂f)², the Gauss–Newton weight.
-    pub fn curvature(&mut self, w: &[f64]) {
-        self.weight.resize(w.len(), 0.0);
-        let (slope, trust) = (&self.slope, &self.trust);
+    /// Fills the weight with w ρ′ (∂r/∂f)², the Gauss–Newton weight; partners of a folded block are added.
+    pub fn curvature(&mut self, block: &Block, channel: usize) {
+        let n = block.len();
+        self.weight.resize(n, 0.0);
+        let (slope, trust, w) = (&self.slope, &self.trust, block.weight(channel));
         let plain = w.iter().zip(slope).map(|(w, s)| w * s * s);
         if trust.is_empty() {
             self.weight.iter_mut().zip(plain).for_each(|(to, v)| *to = v);
         } else {
             self.weight.iter_mut().zip(plain.zip(trust)).for_each(|(to, (v, t))| *to = v * t);
+        }
+        if let Some(other) = &block.swapped {
+            let also = other.weight(channel).iter().zip(&self.swapped[1]).map(|(w, s)| w * s * s);
+            self.weight.iter_mut().zip(also).for_each(|(to, v)| *to += v);
+        }
+    }
+
+    /// Fills the weight with the squared pull; partners of a folded block are added.
+    pub fn squared_pull(&mut self, block: &Block) {
+        self.weight.resize(block.len(), 0.0);
+        vectorised(AddSquares { of: &self.pull, to: &mut self.weight, keep: 0.0 });
+        if block.swapped.is_some() {
+            vectorised(AddSquares { of: &self.swapped[2], to: &mut self.weight, keep: 1.0 });
+        }
+    }
+
+    /// Adds the partners' pull, so that the sums over the near half are those over both.
+    pub fn join_pull(&mut self, block: &Block) {
+        if block.swapped.is_some() {
+            self.pull.iter_mut().zip(&self.swapped[2]).for_each(|(a, b)| *a += b);
         }
     }
 
@@ -125,6 +154,22 @@ impl Scratch {
                 vectorised(Weighted { columns: list, weight, into: into.products });
             }
         }
+    }
+}
+
+/// keep · to + of².
+struct AddSquares<'a> {
+    of: &'a [f64],
+    to: &'a mut [f64],
+    keep: f64,
+}
+
+impl Kernel for AddSquares<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.to.iter_mut().zip(self.of).for_each(|(to, v)| *to = v.mul_add(*v, self.keep * *to));
     }
 }
 
@@ -247,7 +292,7 @@ impl Moments {
 fn omega(samples: &Samples<'_>, block: &Block) -> Vec<Vec<f64>> {
     let of = |c: usize| {
         let mut g = vec![0.0; block.len()];
-        samples.gain(block, c, &mut g);
+        samples.gain(&block.cos_i, &block.y[c], c, &mut g);
         block.weight(c).iter().zip(&g).map(|(w, g)| w * g * g).collect()
     };
     (0..samples.lists()).map(of).collect()
@@ -258,7 +303,7 @@ fn omega(samples: &Samples<'_>, block: &Block) -> Vec<Vec<f64>> {
 pub(super) fn transform(samples: &Samples<'_>) -> Transforms {
     // Each piece has its own sums: few enough that adding them costs nothing, and as many whatever the number of threads.
     let (lists, channels) = (samples.lists(), samples.channels.len());
-    let parts = samples.map_pieces(PIECES, || (Transform::new(lists + channels), vec![0.0; channels]), |sums, block| {
+    let parts = samples.map_pieces(|| (Transform::new(lists + channels), vec![0.0; channels]), |sums, block| {
         let mut values = omega(samples, block);
         for c in 0..channels {
             let weight = &values[if lists == 1 { 0 } else { c }];
@@ -323,13 +368,16 @@ pub(super) fn sums(
     let matrix = if want == Want::Gradient { 0 } else { columns };
     let zero = Sums { cost: 0.0, gradient: DVector::zeros(columns), normal: DMatrix::zeros(matrix, matrix) };
     let start = || (vec![zero.clone(); weights.len()], Scratch::default());
-    let parts = samples.map_pieces(PIECES, start, |(sums, scratch), block| {
+    let parts = samples.map_folded(start, |(sums, scratch), block| {
         scratch.basis(block, lobes);
         for (c, x) in weights.iter().enumerate() {
             let sums = &mut sums[c];
             sums.cost += scratch.residuals(samples, block, c, x, saturation);
             if matrix > 0 {
-                scratch.curvature(block.weight(c));
+                scratch.curvature(block, c);
+            }
+            scratch.join_pull(block);
+            if matrix > 0 {
                 scratch.tally(columns, &mut sums.gradient, &mut sums.normal);
             } else {
                 let (columns, on) = (&scratch.columns[..columns], &scratch.pull[..]);

@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::loss::{Datum, Loss, RELATIVE_EPSILON};
-use super::merl_lines::{Folded, MerlLines, Seen};
+use super::merl_lines::{self, Fold, Folded, MerlLines, Seen};
 use super::options::{FitError, FitOptions, WeightMode};
 use super::transform::Transform;
 use crate::brdf::{LobeKind, ModelSpec};
@@ -37,6 +37,23 @@ pub(super) struct Block {
     pub w: Vec<Vec<f64>>,
     /// Measured value over [`Samples::scale`], one list a channel; 0 where masked.
     pub y: Vec<Vec<f64>>,
+    /// The samples with the two directions swapped, where the block is folded: they have the same coordinate.
+    pub swapped: Option<Box<Swapped>>,
+}
+
+/// The partners of a folded block's samples; weight 0 where there is none.
+#[derive(Debug, Default, Clone)]
+pub(super) struct Swapped {
+    pub cos_i: Vec<f64>,
+    pub w: Vec<Vec<f64>>,
+    pub y: Vec<Vec<f64>>,
+}
+
+impl Swapped {
+    /// Weights of one channel.
+    pub fn weight(&self, channel: usize) -> &[f64] {
+        if self.w.len() == 1 { &self.w[0] } else { &self.w[channel] }
+    }
 }
 
 impl Block {
@@ -48,9 +65,15 @@ impl Block {
         self.w.resize_with(lists, Vec::new);
         self.y.resize_with(channels, Vec::new);
         self.w.iter_mut().chain(&mut self.y).for_each(Vec::clear);
+        if let Some(swapped) = &mut self.swapped {
+            swapped.cos_i.clear();
+            swapped.w.resize_with(lists, Vec::new);
+            swapped.y.resize_with(channels, Vec::new);
+            swapped.w.iter_mut().chain(&mut swapped.y).for_each(Vec::clear);
+        }
     }
 
-    /// Number of samples.
+    /// Number of samples (of one side, where the block is folded).
     pub fn len(&self) -> usize {
         self.pairs.len()
     }
@@ -82,6 +105,7 @@ impl Block {
             x: pick(&self.x),
             w: self.w.iter().map(pick).collect(),
             y: self.y.iter().map(pick).collect(),
+            swapped: None,
         }
     }
 
@@ -116,11 +140,16 @@ fn place(w: DVec3) -> [i32; 2] {
     [(w.z * STEPS).round() as i32, (round * STEPS).round() as i32]
 }
 
-/// Values over their unit, and their weights, 0 where masked.
+/// The last `more` places of a list that grows by so many zeros.
+fn grown(list: &mut Vec<f64>, more: usize) -> &mut [f64] {
+    let start = list.len();
+    list.resize(start + more, 0.0);
+    &mut list[start..]
+}
+
+/// Values over their unit and their weights, both 0 where the value is masked.
 struct Values<'a> {
-    plane: &'a [f64],
     unit: f64,
-    weight: f64,
     y: &'a mut [f64],
     w: &'a mut [f64],
 }
@@ -130,11 +159,11 @@ impl Kernel for Values<'_> {
 
     #[inline(always)]
     fn run(self) {
-        for (y, v) in self.y.iter_mut().zip(self.plane) {
-            *y = if v.is_nan() { 0.0 } else { v * self.unit };
+        for (w, y) in self.w.iter_mut().zip(&*self.y) {
+            *w = if y.is_nan() { 0.0 } else { *w };
         }
-        for (w, v) in self.w.iter_mut().zip(self.plane) {
-            *w = if v.is_nan() { 0.0 } else { self.weight };
+        for y in self.y {
+            *y = if y.is_nan() { 0.0 } else { *y * self.unit };
         }
     }
 }
@@ -318,18 +347,38 @@ impl<'a> Samples<'a> {
         (0..self.blocks()).into_par_iter().map_init(Block::default, step).collect()
     }
 
-    /// Cuts the samples into at most `pieces` runs of blocks; each folds its blocks in order into sums of its own. Results in
+    /// Cuts the samples into at most [`PIECES`] runs of blocks; each folds its blocks in order into sums of its own. Results in
     /// order.
     pub fn map_pieces<T: Send>(
         &self,
-        pieces: usize,
+        start: impl Fn() -> T + Sync + Send,
+        add: impl Fn(&mut T, &Block) + Sync + Send,
+    ) -> Vec<T> {
+        self.pieces(Block::default, start, add)
+    }
+
+    /// As [`Samples::map_pieces`], with the samples of a table folded about φd = 90° where errors are not asked of them one by one.
+    pub fn map_folded<T: Send>(
+        &self,
+        start: impl Fn() -> T + Sync + Send,
+        add: impl Fn(&mut T, &Block) + Sync + Send,
+    ) -> Vec<T> {
+        let plain = self.measurement.sigma.is_none() && self.measurement.common.is_empty() && self.loss != Loss::Relative;
+        let folds = plain && matches!(self.source, Source::Merl(_));
+        let block = || Block { swapped: folds.then(Box::default), ..Block::default() };
+        self.pieces(block, start, add)
+    }
+
+    fn pieces<T: Send>(
+        &self,
+        block: impl Fn() -> Block + Sync + Send,
         start: impl Fn() -> T + Sync + Send,
         add: impl Fn(&mut T, &Block) + Sync + Send,
     ) -> Vec<T> {
         let blocks = self.blocks();
-        let pieces = pieces.min(blocks).max(1);
+        let pieces = PIECES.min(blocks).max(1);
         let run = |p: usize| {
-            let (mut sums, mut block) = (start(), Block::default());
+            let (mut sums, mut block) = (start(), block());
             for b in blocks * p / pieces..blocks * (p + 1) / pieces {
                 self.fill(b, &mut block);
                 add(&mut sums, &block);
@@ -354,33 +403,47 @@ impl<'a> Samples<'a> {
             }
             Source::Merl(lines) => {
                 for line in lines.lines(b) {
-                    lines.append(&line, block);
-                    self.append_values(line.entries(), line.weight, block);
+                    let fold = lines.append(&line, block);
+                    self.append_values(line.entries(), fold, line.weight, block);
+                }
+                merl_lines::finish(block);
+                let unit = 1.0 / self.scale;
+                let swapped = block.swapped.as_deref_mut().map(|s| (&mut s.w, &mut s.y));
+                for (w, y) in std::iter::once((&mut block.w, &mut block.y)).chain(swapped) {
+                    for c in (0..y.len()).rev() {
+                        let none = &mut Vec::new();
+                        let w = w.get_mut(c).unwrap_or(none);
+                        vectorised(Values { unit, y: &mut y[c], w });
+                    }
                 }
             }
         }
     }
 
-    /// Appends weights and values of entries in a row of a table.
-    fn append_values(&self, entries: Range<usize>, weight: f64, block: &mut Block) {
-        let (start, unit) = (block.pairs.len(), 1.0 / self.scale);
-        let end = start + entries.len();
-        block.pairs.resize(end, 1.0);
+    /// Appends weights and values of entries in a row of a table, folded or plain.
+    fn append_values(&self, entries: Range<usize>, fold: Option<Fold>, weight: f64, block: &mut Block) {
+        let start = block.pairs.len();
+        let near = fold.map_or(entries.len(), Fold::len);
+        block.pairs.resize(start + near, 1.0);
         block.pairs[start] = 0.0;
-        for (c, y) in block.y.iter_mut().enumerate() {
+        for c in 0..block.y.len() {
             let plane = &self.measurement.plane(self.channels[c])[entries.clone()];
-            y.resize(end, 0.0);
-            let mut none = [];
-            let w = match block.w.get_mut(c).filter(|_| c < self.lists) {
-                None => &mut none[..],
-                Some(list) => {
-                    list.resize(end, 0.0);
-                    &mut list[start..]
+            let weight = weight * self.factor[c];
+            block.y[c].extend_from_slice(&plane[..near]);
+            if c < self.lists {
+                grown(&mut block.w[c], near).fill(weight);
+            }
+            if let (Some(fold), Some(swapped)) = (fold, &mut block.swapped) {
+                let y = grown(&mut swapped.y[c], near);
+                y.fill(f64::NAN); // those without a partner are masked
+                y[fold.partners()].copy_from_slice(&plane[fold.far()]);
+                y[fold.partners()].reverse();
+                if c < self.lists {
+                    grown(&mut swapped.w[c], near).fill(weight);
                 }
-            };
-            vectorised(Values { plane, unit, weight: weight * self.factor[c], y: &mut y[start..], w });
+            }
         }
-        if self.measurement.sigma.is_some() || !self.measurement.common.is_empty() {
+        if fold.is_none() && (self.measurement.sigma.is_some() || !self.measurement.common.is_empty()) {
             block.index.extend(entries.map(|e| e as u32));
         }
     }
@@ -531,15 +594,15 @@ impl<'a> Samples<'a> {
         (0..block.len()).step_by(step).map(|from| from..(from + step).min(block.len())).collect()
     }
 
-    /// Fills `out` with the ∂r/∂f of a linear loss over a block, of one channel.
-    pub fn gain(&self, block: &Block, channel: usize, out: &mut [f64]) {
+    /// Fills `out` with the ∂r/∂f of a linear loss at samples with these cosθi and values, of one channel.
+    pub fn gain(&self, cos_i: &[f64], y: &[f64], channel: usize, out: &mut [f64]) {
         match self.loss {
             Loss::L2 => out.fill(1.0),
             Loss::Relative => {
                 let epsilon = self.epsilon[channel];
-                out.iter_mut().zip(&block.y[channel]).for_each(|(g, y)| *g = 1.0 / (y.abs() + epsilon));
+                out.iter_mut().zip(y).for_each(|(g, y)| *g = 1.0 / (y.abs() + epsilon));
             }
-            Loss::CosineL2 | Loss::Log | Loss::CubeRoot => out.copy_from_slice(&block.cos_i),
+            Loss::CosineL2 | Loss::Log | Loss::CubeRoot => out.copy_from_slice(cos_i),
         }
     }
 }
@@ -553,7 +616,7 @@ fn power_of_two(largest: f64) -> f64 {
 const LEAST_UNSCALED: f64 = 1e-100;
 
 /// Pieces that a pass with large sums is cut into; it fixes how they are bracketed.
-pub(super) const PIECES: usize = 16;
+const PIECES: usize = 16;
 
 /// The transforms of weights and weighted data (measures: lists, then channels), and each channel's energy Σ w g² y².
 pub(super) type Transforms = (Transform, Vec<f64>);

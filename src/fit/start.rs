@@ -125,7 +125,16 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
     }
     let run = |start: &Vec<f64>| polish_start(search, problem, start.clone(), steps);
     let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
-    best_of(outcomes, lattice)
+    let mut best = best_of(outcomes, lattice)?;
+    if random > 0 && !problem.layout.is_empty() {
+        // The shapes' last digits, where the cost itself no longer tells points apart.
+        let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
+        let last = solver::minimize(search, lm, best.outcome.t.clone(), steps);
+        let last = last.map_err(|e| FitError::Solver { reason: e.to_string() })?;
+        best.outcome.history.extend(last.history.into_iter().skip(1));
+        (best.outcome.t, best.outcome.cost, best.outcome.stop) = (last.t, last.cost, last.stop);
+    }
+    Ok(best)
 }
 
 /// The lowest minimum of a problem that takes passes over its samples.
@@ -150,7 +159,7 @@ pub(super) fn search_streamed(problem: &Problem<'_>, steps: u64) -> Result<Found
 }
 
 fn polish_start(at: impl Linearize, problem: &Problem<'_>, start: Vec<f64>, steps: u64) -> Result<Outcome, FitError> {
-    // The last digits are won on true residuals, not here.
+    // The last digits are for the best alone.
     let options = SolverOptions { ftol: 1e-13, polish: 0, ..SolverOptions::default() };
     let lm = LevenbergMarquardt::new(options).with_bounds(problem.bounds.clone());
     solver::minimize(at, lm, DVector::from_vec(start), steps).map_err(|e| FitError::Solver { reason: e.to_string() })

@@ -1,14 +1,14 @@
 //! Noise or model error? Residuals of neighbouring directions are independent where they are noise, and alike where the model can't
 //! bend as the material does.
 
-use crate::numeric::simd::{Kernel, dot, dot3, vectorised};
+use crate::numeric::simd::{Kernel, dot, dot3, map, vectorised};
 
 /// Sums over pairs of neighbours.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Neighbours {
-    /// Σ √w r √w′ r′.
+    /// Σ w r r′.
     product: f64,
-    /// Σ (w r² + w′ r′²)/2.
+    /// Σ w (r² + r′²)/2.
     square: f64,
     /// Pairs.
     count: usize,
@@ -49,20 +49,17 @@ impl Kernel for Sum<'_> {
         if n < 2 {
             return Neighbours::default();
         }
-        // √w r and its products with the next one's.
+        // r where it counts; the weights of neighbours are as good as equal.
         let mut u = vec![0.0; n];
-        for i in 0..n {
-            u[i] = self.w[i].sqrt() * self.r[i];
-        }
+        map(self.r, self.w, &mut u, |r, w| if w > 0.0 { r } else { 0.0 });
+        let mut weight = self.pairs.to_vec();
+        weight.iter_mut().zip(self.w).for_each(|(p, w)| *p *= w);
         if !self.trust.is_empty() {
-            for i in 0..n {
-                u[i] *= self.trust[i].sqrt();
-            }
+            weight.iter_mut().zip(self.trust).for_each(|(p, t)| *p *= t);
         }
-        let pairs = &self.pairs[1..n];
-        let (before, after) = (&u[..n - 1], &u[1..]);
-        let square = 0.5 * (dot3(pairs, before, before) + dot3(pairs, after, after));
-        Neighbours { product: dot3(pairs, before, after), square, count: dot(pairs, pairs) as usize }
+        let (weight, before, after) = (&weight[1..], &u[..n - 1], &u[1..]);
+        let square = 0.5 * (dot3(weight, before, before) + dot3(weight, after, after));
+        Neighbours { product: dot3(weight, before, after), square, count: dot(self.pairs, self.pairs) as usize }
     }
 }
 

@@ -102,6 +102,17 @@ pub fn ln_1p(y: f64) -> f64 {
     if rounded == 0.0 { y } else { ln(u) * (y / rounded) }
 }
 
+/// out = f(a, b), element by element. Lists whose length is a multiple of 32 leave nothing to the slow remainder of the compiler's
+/// unrolled loop.
+#[inline(always)]
+pub fn map(a: &[f64], b: &[f64], out: &mut [f64], f: impl Fn(f64, f64) -> f64) {
+    let n = out.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for i in 0..n {
+        out[i] = f(a[i], b[i]);
+    }
+}
+
 /// Running sums per kernel: as many as two AVX-512 registers hold, whatever the machine.
 const LANES: usize = 16;
 
