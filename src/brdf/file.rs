@@ -89,6 +89,37 @@ pub struct FitRecord {
     /// Standard errors from redrawn data, where they were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap: Option<BootstrapRecord>,
+    /// How the model was chosen, where that was left to the fit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub choice: Option<ModelChoice>,
+}
+
+/// Models compared, and the one that was taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelChoice {
+    /// Its specification.
+    pub chosen: String,
+    /// Why it was.
+    pub reason: String,
+    /// All that were compared, simplest first.
+    pub candidates: Vec<ModelCandidate>,
+}
+
+/// A model among others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelCandidate {
+    /// Its specification.
+    pub model: String,
+    /// Weights and shapes that it has.
+    pub parameters: u64,
+    /// Its rmse on the samples that it was fitted to.
+    pub rmse: f64,
+    /// Its rmse on directions that it was not fitted to, cells of (θi, θo) held out in turn.
+    pub held_out_rmse: f64,
+    /// Akaike's criterion, corrected for few samples, over the number of independent samples that the residuals are worth.
+    pub aicc: f64,
+    /// Schwarz's criterion, over the same number.
+    pub bic: f64,
 }
 
 /// Correlations between the errors of parameters.

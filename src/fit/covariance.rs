@@ -23,6 +23,10 @@ pub(super) struct Uncertainty {
     pub errors: Vec<Option<f64>>,
     /// Covariance, rows and columns of undetermined parameters meaningless.
     pub covariance: DMatrix<f64>,
+    /// Covariance by the residuals alone, whatever σ is stated: how far another drawing of the samples would move the parameters.
+    pub drawn: DMatrix<f64>,
+    /// A.
+    pub normal: DMatrix<f64>,
     /// The inverse of A, pseudo where singular: the cost rises by δ²/Aⱼⱼ⁻¹ when parameter j alone is held off by δ.
     pub bread: DMatrix<f64>,
     /// Standard errors if the residuals of neighbours are taken as one error, not many: what model error does to the parameters.
@@ -49,6 +53,8 @@ struct ChannelSums {
     spread: DMatrix<f64>,
     /// B of the values with one.
     known: DMatrix<f64>,
+    /// B of all values by their residuals; the same as `spread` where no σ is stated.
+    squares: DMatrix<f64>,
     common: Vec<DVector<f64>>,
     /// Whether a sample lies where the lobes with a shape are 0 whatever it is.
     dark: bool,
@@ -77,10 +83,12 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let add = |part: &mut Part, block: &Block| part.add(problem, at, block, moments.is_none());
     let parts = if moments.is_some() { samples.map_folded(start, add) } else { samples.map_pieces(start, add) };
 
+    let has_sigma = samples.measurement.sigma.is_some() && problem.saturation.is_none();
     let (mut normal, mut spread) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
     let mut clusters = DMatrix::zeros(parameters, parameters);
     let mut common = vec![DVector::zeros(parameters); samples.measurement.common.len()];
     let mut dark = vec![false; channels];
+    let mut drawn = DMatrix::zeros(parameters, parameters);
     let (mut cost, mut stated, mut neighbours, mut count) = (0.0, (0.0, 0), Neighbours::default(), 0);
     for part in &parts {
         clusters += &part.clusters;
@@ -91,7 +99,9 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
             for (i, &a) in place.iter().enumerate() {
                 for (j, &b) in place.iter().enumerate() {
                     let both = strength[i] * strength[j];
+                    let squares = if has_sigma { &sums.squares } else { &sums.spread };
                     normal[(a, b)] += both * sums.normal[(i.max(j), i.min(j))];
+                    drawn[(a, b)] += both * squares[(i.max(j), i.min(j))];
                     spread[(a, b)] += both * (sums.known[(i.max(j), i.min(j))] + inflation * sums.spread[(i.max(j), i.min(j))]);
                 }
                 common.iter_mut().zip(&sums.common).for_each(|(total, part)| total[a] += strength[i] * part[i]);
@@ -124,6 +134,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         errors,
         structured: grouped.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
         covariance,
+        drawn: sandwich.covariance(&drawn, &[]),
+        normal,
         bread: sandwich.bread,
         neighbours,
         stated,
@@ -222,6 +234,7 @@ impl Part {
             normal: DMatrix::zeros(k, k),
             spread: DMatrix::zeros(k, k),
             known: DMatrix::zeros(k, k),
+            squares: DMatrix::zeros(k, k),
             common: vec![DVector::zeros(k); problem.samples.measurement.common.len()],
             dark: false,
             stated: (0.0, 0),
@@ -326,6 +339,7 @@ impl ChannelSums {
         if let Some(sigma) = measurement.sigma_plane(own) {
             let known = self.stated(block, w, &data_slopes, sigma);
             if problem.saturation.is_none() {
+                scratch.tally(k, &mut gradient, &mut self.squares);
                 let mut rest = std::mem::take(&mut scratch.weight);
                 let spread = |(i, s): (usize, &Option<f64>)| s.map_or(0.0, |s| (w[i] * scratch.slope[i] * s).powi(2));
                 scratch.weight = known.iter().enumerate().map(spread).collect();

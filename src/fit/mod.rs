@@ -6,6 +6,9 @@
 //! over the data compresses: after it, a cost with its derivatives takes microseconds. So no start value is needed: the whole range is
 //! searched.
 
+mod bootstrap;
+mod budget;
+mod choose;
 mod covariance;
 mod energy;
 mod intervals;
@@ -26,9 +29,10 @@ mod transform;
 
 use std::time::Instant;
 
-use crate::brdf::Material;
+use crate::brdf::{Material, ModelSpec};
 use crate::measurement::Measurement;
 
+pub use choose::fit_best_model;
 pub use covariance::Interval;
 pub use limits::{Field, Limit, ParameterName};
 pub use loss::{Datum, Loss, Robust, RobustKind};
@@ -62,13 +66,12 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![&all] };
     let mut parts = Vec::new();
     for group in &groups {
-        let (samples, transforms) = Samples::gather(measurement, &model, options, group)?;
-        parts.push(part::fit(&samples, transforms, &model, &ranges, options)?);
+        parts.push(fit_part(measurement, &model, &ranges, options, group, clock)?);
     }
     let samples = if let [part] = &parts[..] {
         part.samples
     } else {
-        Samples::gather(measurement, &model, options, &all)?.0.len()
+        Samples::gather(measurement, &model, options, &all, 1)?.0.len()
     };
     let facts = record::Facts { measurement, options, model: &model, ranges: &ranges, parts: &parts, samples };
     let mut material = record::material(&facts);
@@ -78,4 +81,24 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let stop = parts.last().map_or(Stop::MaxIterations, |p| p.stop);
     let history = parts.into_iter().flat_map(|p| p.history).collect();
     Ok(Fitted { material, history, stop })
+}
+
+/// The fit of channels that share their shapes, to as many samples as the time or the target asks for.
+fn fit_part(
+    measurement: &Measurement,
+    model: &ModelSpec,
+    ranges: &Ranges,
+    options: &FitOptions,
+    channels: &[usize],
+    clock: Instant,
+) -> Result<part::Part, FitError> {
+    if options.time_budget.is_some() || options.target_rmse_excess.is_some() {
+        return budget::fit(measurement, model, ranges, options, channels, clock);
+    }
+    let (samples, transforms) = Samples::gather(measurement, model, options, channels, 1)?;
+    let mut part = part::fit(&samples, transforms, model, ranges, options)?;
+    if let Some(draws) = options.bootstrap {
+        part.bootstrap = Some(bootstrap::bootstrap(&samples, &part, model, ranges, options, draws)?);
+    }
+    Ok(part)
 }

@@ -1,12 +1,13 @@
 //! One fit of channels that share their shapes, from samples to intervals.
 
+use super::budget::Subset;
 use super::covariance::{self, Uncertainty};
 use super::intervals::{self, Intervals};
 use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
 use super::passes::{self, Saturation, Scratch};
 use super::reduced::{Problem, Search, Solution, Streamed, polish};
-use super::samples::{Samples, Transforms};
+use super::samples::{self, Samples, Transforms};
 use super::solver::{self, Iteration, LevenbergMarquardt, Stop};
 use super::start::{self, SearchReport};
 use super::structure::{self, Structure};
@@ -35,6 +36,10 @@ pub(super) struct Part {
     pub stop: Stop,
     pub history: Vec<Iteration>,
     pub report: SearchReport,
+    /// How much of the samples it is about, where not all.
+    pub subset: Option<Subset>,
+    /// Standard deviation of every parameter over redrawn data, in the uncertainty's order and scale.
+    pub bootstrap: Option<Vec<f64>>,
 }
 
 /// Reduced cost below this share of the data's energy, or a Gram matrix of a larger condition number: sums of products have lost digits.
@@ -97,7 +102,7 @@ const SCALE_SETTLED: f64 = 1e-9;
 fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitError> {
     let samples = problem.samples;
     let step = samples.len().div_ceil(START_SAMPLES).max(1);
-    let few = samples.listed(|i| i % step == start::offset(i / step, step));
+    let few = samples.listed(|i| i % step == samples::offset(i / step, step));
     let mut rough = problem.on(&few);
     let mut found = start::search_streamed(&rough, options.max_iterations)?;
     let mut solution = Streamed::new(&rough).solve(found.outcome.t.as_slice());
@@ -207,5 +212,7 @@ fn finish(
         solution,
         uncertainty,
         intervals,
+        subset: None,
+        bootstrap: None,
     })
 }

@@ -6,7 +6,8 @@ use super::options::{FitOptions, WeightMode};
 use super::part::Part;
 use super::solver::Stop;
 use crate::brdf::{
-    Correlation, FitRecord, LobeKind, LobeRecord, LobeTerm, Material, ModelSpec, PerChannel, ResidualRecord, SearchRecord,
+    BootstrapRecord, Correlation, FitRecord, LobeKind, LobeRecord, LobeTerm, Material, ModelSpec, PerChannel, ResidualRecord,
+    SearchRecord, SubsetRecord,
 };
 use crate::measurement::Measurement;
 
@@ -27,6 +28,7 @@ struct Row {
     error: LobeRecord<Option<f64>>,
     interval: LobeRecord<Option<(f64, f64)>>,
     model_error: LobeRecord<Option<f64>>,
+    bootstrap: LobeRecord<Option<f64>>,
 }
 
 /// Correlations of more parameters than this are left out.
@@ -41,6 +43,7 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
     let mut material = Material { channels: facts.measurement.channels.clone(), lobes: Vec::new(), fit: None };
     let mut record = facts.numbers();
     let structured = record.residual.as_ref().is_some_and(|r| r.structured_share > STRUCTURED);
+    let mut redrawn = Vec::new();
     let mut sorted: Vec<Option<Row>> = rows.drain(..).map(Some).collect();
     for row in order.iter().filter_map(|&l| sorted[l].take()) {
         material.lobes.push(row.term);
@@ -49,7 +52,12 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
         if structured {
             record.model_error.push(row.model_error);
         }
+        redrawn.push(row.bootstrap);
     }
+    record.bootstrap = facts
+        .options
+        .bootstrap
+        .map(|b| BootstrapRecord { replicates: u64::from(b.replicates), standard_error: redrawn });
     record.undetermined = undetermined(&material, &record.standard_error);
     record.correlation = facts.correlation(&order);
     record.energy = energy::energy(&material, facts.options.conserve_energy);
@@ -84,6 +92,7 @@ impl Facts<'_> {
             iterations: self.parts.iter().map(|p| p.history.len().saturating_sub(1) as u64).sum(),
             residual: self.residual(),
             search: Some(self.search()),
+            subset: self.subset(),
             ..FitRecord::default()
         }
     }
@@ -105,6 +114,18 @@ impl Facts<'_> {
             structured_share: if both > 0.0 { model * model / both } else { 0.0 },
             noise_from: if all[0].1.from_sigma { "sigma" } else { "neighbours" }.into(),
             effective_samples: all.iter().map(|(_, s)| s.effective_samples).sum(),
+        })
+    }
+
+    fn subset(&self) -> Option<SubsetRecord> {
+        let parts = self.parts.iter().filter_map(|p| p.subset.map(|s| (p.samples, s)));
+        // Channels fitted apart may have ended at different parts; the least sure one is told.
+        let (samples, subset) = parts.max_by(|a, b| a.1.excess_95.total_cmp(&b.1.excess_95))?;
+        Some(SubsetRecord {
+            samples: samples as u64,
+            of: subset.of as u64,
+            rmse_excess: subset.excess,
+            rmse_excess_95: subset.excess_95,
         })
     }
 
@@ -157,11 +178,16 @@ impl Facts<'_> {
             let (part, i, unit) = at(c);
             part.uncertainty.errors[i].map(|_| part.uncertainty.structured[i] * unit)
         };
+        let redrawn = |c: usize| {
+            let (part, i, unit) = at(c);
+            part.bootstrap.as_ref().map(|b| b[i] * unit)
+        };
         let mut row = Row {
             term: LobeTerm { kind, weight: channels.clone().map(weight).collect(), shape: None },
             error: LobeRecord { weight: channels.clone().map(error).collect(), shape: Vec::new() },
             interval: LobeRecord { weight: channels.clone().map(interval).collect(), shape: Vec::new() },
-            model_error: LobeRecord { weight: channels.map(model_error).collect(), shape: Vec::new() },
+            model_error: LobeRecord { weight: channels.clone().map(model_error).collect(), shape: Vec::new() },
+            bootstrap: LobeRecord { weight: channels.map(redrawn).collect(), shape: Vec::new() },
         };
         let dark = row.term.weight.iter().all(|w| *w == 0.0);
         let mut shape = Vec::new();
@@ -172,6 +198,7 @@ impl Facts<'_> {
             row.error.shape.push((name(), shared(&values, |v| v.error)));
             row.interval.shape.push((name(), shared(&values, |v| v.interval)));
             row.model_error.shape.push((name(), shared(&values, |v| v.model_error)));
+            row.bootstrap.shape.push((name(), shared(&values, |v| v.bootstrap)));
         }
         if !dark || shape.is_empty() {
             row.term.shape = Some(shape);
@@ -188,7 +215,9 @@ impl Facts<'_> {
             };
             p.layout.iter().enumerate().any(|(i, (lobe, _))| ends(i) && p.lit(*lobe))
         };
-        if self.parts.iter().any(|p| matches!(p.stop, Stop::MaxIterations)) {
+        if self.parts.iter().any(|p| p.subset.is_some_and(|s| s.out_of_time)) {
+            "budget"
+        } else if self.parts.iter().any(|p| matches!(p.stop, Stop::MaxIterations)) {
             "max-iterations"
         } else if self.parts.iter().any(at_bound) {
             "at-bound"
@@ -252,6 +281,16 @@ impl Facts<'_> {
         if refused > 0 {
             list.push(format!("{refused} values are too negative for the logarithm of the loss and were left out"));
         }
+        if let Some(subset) = record.subset.as_ref().filter(|_| record.status == "budget") {
+            list.push(format!(
+                "the time ended at {} of about {} directions: the rmse over all is expected to be {:.2} % above the best, and at most \
+                 {:.2} % with 95 % confidence",
+                subset.samples,
+                subset.of,
+                100.0 * subset.rmse_excess,
+                100.0 * subset.rmse_excess_95
+            ));
+        }
         list.extend(self.structure_warning(record));
         list.extend(record.energy.as_ref().and_then(|e| energy::warning(material, e)));
         list
@@ -276,6 +315,7 @@ struct ShapeValue {
     error: Option<f64>,
     interval: Option<(f64, f64)>,
     model_error: Option<f64>,
+    bootstrap: Option<f64>,
 }
 
 impl Part {
@@ -287,20 +327,23 @@ impl Part {
     fn shape_value(&self, l: usize, own: usize) -> ShapeValue {
         let of_lobe = self.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l).map(|(i, _)| i);
         let Some(i) = of_lobe.clone().nth(own) else {
-            return ShapeValue { value: f64::NAN, error: None, interval: None, model_error: None };
+            return ShapeValue { value: f64::NAN, error: None, interval: None, model_error: None, bootstrap: None };
         };
         let value = self.solution.t[i].exp();
         let place = self.solution.weights.len() * self.solution.lobes.len() + i;
         let (low, high) = self.bounds[i];
         if low == high {
             let value = if value <= 2.0 * TINY_SHAPE { 0.0 } else { low.exp() };
-            return ShapeValue { value, error: Some(0.0), interval: Some((value, value)), model_error: Some(0.0) };
+            let nothing = Some(0.0);
+            let interval = Some((value, value));
+            return ShapeValue { value, error: nothing, interval, model_error: nothing, bootstrap: nothing };
         }
         // An error wider than the whole range that is searched means that the data leave the shape open.
         let error = self.uncertainty.errors[place].filter(|e| self.lit(l) && *e < high - low);
         let interval = error.and_then(|_| self.intervals[place]).map(|(low, high)| (low.exp(), high.exp()));
         let model_error = error.map(|_| self.uncertainty.structured[place] * value);
-        ShapeValue { value, error: error.map(|e| e * value), interval: finite(interval), model_error }
+        let bootstrap = error.and(self.bootstrap.as_ref()).map(|b| b[place] * value);
+        ShapeValue { value, error: error.map(|e| e * value), interval: finite(interval), model_error, bootstrap }
     }
 }
 

@@ -214,12 +214,14 @@ struct Survey {
 }
 
 impl<'a> Samples<'a> {
-    /// Selects and prepares the samples of the given channels; with them, where they come on the way, their transforms.
+    /// Selects and prepares the samples of the given channels; with them, where they come on the way, their transforms. Of every `thin`
+    /// entries in a row only one counts, at a place that varies.
     pub fn gather(
         measurement: &'a Measurement,
         model: &ModelSpec,
         options: &FitOptions,
         channels: &[usize],
+        thin: usize,
     ) -> Result<(Self, Option<Transforms>), FitError> {
         let solid_angle = options.weights == WeightMode::SolidAngle && measurement.weights.known();
         let weighting = match (options.use_sigma, solid_angle) {
@@ -242,12 +244,12 @@ impl<'a> Samples<'a> {
             weighting,
         };
         let mut transforms = None;
-        if let Some(lines) = samples.lines(options, solid_angle) {
+        if let Some(lines) = samples.lines(options, solid_angle).filter(|_| thin == 1) {
             transforms = samples.fold(&lines)?;
             samples.source = Source::Merl(lines);
         } else {
             let kind = model.lobes().iter().copied().find(|k| !k.lobe().parameters().is_empty());
-            samples.list(kind, options, solid_angle)?;
+            samples.list(kind, options, solid_angle, thin)?;
         }
         if transforms.is_none() {
             let survey = samples.survey();
@@ -449,8 +451,14 @@ impl<'a> Samples<'a> {
     }
 
     /// Lists every sample that counts, with raw weights.
-    fn list(&mut self, kind: Option<LobeKind>, options: &FitOptions, solid_angle: bool) -> Result<(), FitError> {
-        let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle, kind };
+    fn list(
+        &mut self,
+        kind: Option<LobeKind>,
+        options: &FitOptions,
+        solid_angle: bool,
+        thin: usize,
+    ) -> Result<(), FitError> {
+        let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle, kind, thin };
         let parts = sum::map_blocks(self.measurement.len(), |range| judge.list(range));
         let mut left = Left::default();
         let mut all = Block::default();
@@ -516,7 +524,7 @@ impl<'a> Samples<'a> {
     fn settle(&mut self, survey: &Survey, options: &FitOptions) -> Result<(), FitError> {
         if survey.directions == 0 {
             // Only a table comes here: the lists say themselves what is missing.
-            let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle: false, kind: None };
+            let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle: false, kind: None, thin: 1 };
             let reasons = sum::map_blocks(self.measurement.len(), |range| judge.list(range).1);
             let mut left = Left::default();
             reasons.iter().for_each(|r| left.add(r));
@@ -567,6 +575,25 @@ impl<'a> Samples<'a> {
             position += block.len();
         }
         self.with(all)
+    }
+
+    /// Direction pair of every sample of a list.
+    pub fn pairs_of(&self) -> Vec<(DVec3, DVec3)> {
+        match &self.source {
+            Source::Listed(all) => all.index.iter().map(|i| self.measurement.directions.pair(*i as usize)).collect(),
+            Source::Merl(_) => Vec::new(),
+        }
+    }
+
+    /// A list's samples with every weight multiplied by `factor` (one a sample); the weights are not normalised again.
+    pub fn reweighted(&self, factor: &[f64]) -> Self {
+        let mut other = self.listed(|_| true);
+        if let Source::Listed(all) = &mut other.source {
+            for w in &mut all.w {
+                w.iter_mut().zip(factor).for_each(|(w, f)| *w *= f);
+            }
+        }
+        other
     }
 
     fn with(&self, all: Block) -> Self {
@@ -632,6 +659,13 @@ struct Judge<'a> {
     least_cos: f64,
     solid_angle: bool,
     kind: Option<LobeKind>,
+    thin: usize,
+}
+
+/// Which of the `step` entries of run `run` a thinned-out list keeps: spread evenly, without a beat with the grid's own period.
+pub(super) fn offset(run: usize, step: usize) -> usize {
+    let golden = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+    (golden * step as u64 >> 32) as usize
 }
 
 /// Entries left out, by reason.
@@ -676,7 +710,10 @@ impl Judge<'_> {
         let (mut block, mut left) = (Block::default(), Left::default());
         block.reset(channels, channels);
         let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
-        for entry in range.filter(|e| e.is_multiple_of(self.options.stride)) {
+                let counts = |e: &usize| {
+            e.is_multiple_of(self.options.stride) && (self.thin == 1 || e % self.thin == offset(e / self.thin, self.thin))
+        };
+        for entry in range.filter(counts) {
             left.entries += 1;
             let (wi, wo) = self.samples.measurement.directions.pair(entry);
             if !(wi.z > 0.0 && wo.z > 0.0) {

@@ -183,12 +183,6 @@ fn drawn(problem: &Problem<'_>, count: usize) -> Vec<Vec<f64>> {
     (0..count).map(|_| problem.bounds.iter().map(&mut draw).collect()).collect()
 }
 
-/// Which of the `step` samples of run `run` a thinned-out list keeps: spread evenly, without a beat with the grid's own period.
-pub(super) fn offset(run: usize, step: usize) -> usize {
-    let golden = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-    (golden * step as u64 >> 32) as usize
-}
-
 fn best_of(outcomes: Vec<Outcome>, lattice: usize) -> Result<Found, FitError> {
     let lowest = outcomes.iter().map(|o| o.cost).fold(f64::INFINITY, f64::min);
     let same = |a: f64, b: f64| a <= b * (1.0 + SAME) + f64::MIN_POSITIVE;

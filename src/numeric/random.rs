@@ -16,6 +16,8 @@ pub enum Purpose {
     ReadNoise = 3,
     /// Draws of a test or a study.
     Study = 4,
+    /// Data sets redrawn by a bootstrap.
+    Bootstrap = 5,
 }
 
 /// The stream of (seed, purpose, index).

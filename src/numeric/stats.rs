@@ -29,6 +29,12 @@ pub fn chi_square_p(chi2: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(f64::NAN, |d| d.sf(chi2))
 }
 
+/// The value that χ² with `freedom` > 0 degrees of freedom stays below with probability `p`.
+#[must_use]
+pub fn chi_square_quantile(p: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(f64::NAN, |d| d.inverse_cdf(p))
+}
+
 /// Significance level of one test out of `tests` independent ones, so that all together have `level` (Šidák 1967).
 #[must_use]
 pub fn sidak(level: f64, tests: usize) -> f64 {
@@ -70,6 +76,7 @@ mod tests {
         assert!((normal_quantile(0.975) - 1.959_963_985).abs() < 1e-8);
         assert!((student_quantile(0.975, 5.0) - 2.570_582).abs() < 1e-5);
         assert!((chi_square_p(18.307, 10.0) - 0.05).abs() < 1e-5);
+        assert!((chi_square_quantile(0.95, 10.0) - 18.307).abs() < 1e-3);
         assert!((two_sided_p(1.959_963_985) - 0.05).abs() < 1e-9);
         assert!((sidak(0.05, 1) - 0.05).abs() < 1e-15);
         assert!(sidak(0.01, 786_432) > 1.2e-8 && sidak(0.01, 786_432) < 1.3e-8);

@@ -1,0 +1,86 @@
+//! Accuracy against time: a fit to a part of the samples, and how far it may be from the fit to all.
+
+use std::time::{Duration, Instant};
+
+use super::covariance::Uncertainty;
+use super::limits::Ranges;
+use super::options::{FitError, FitOptions};
+use super::part::{self, Part};
+use super::samples::Samples;
+use crate::brdf::ModelSpec;
+use crate::measurement::Measurement;
+use crate::numeric::stats::chi_square_quantile;
+
+/// A part of the samples, and what that costs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Subset {
+    /// Directions there are.
+    pub of: usize,
+    /// Expected excess of the rmse over all samples, as a share of the best fit's.
+    pub excess: f64,
+    /// What it exceeds with probability 5 % at most.
+    pub excess_95: f64,
+    /// Whether the time ended the work, not the accuracy.
+    pub out_of_time: bool,
+}
+
+/// Each round takes so many times the samples of the one before.
+const GROWTH: usize = 4;
+/// Fewer entries than this are not worth thinning out.
+const WORTH: usize = 20_000;
+/// Entries of the first round.
+const FIRST: usize = 6000;
+/// What is kept of the time for what a prediction misses.
+const RESERVE: f64 = 0.8;
+
+/// Fits growing parts of the samples until the target is met or the time would be exceeded; all of them where that is possible.
+pub(super) fn fit(
+    measurement: &Measurement,
+    model: &ModelSpec,
+    ranges: &Ranges,
+    options: &FitOptions,
+    channels: &[usize],
+    clock: Instant,
+) -> Result<Part, FitError> {
+    let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
+    loop {
+        let began = Instant::now();
+        let (samples, transforms) = Samples::gather(measurement, model, options, channels, thin)?;
+        let mut part = part::fit(&samples, transforms, model, ranges, options)?;
+        if thin == 1 {
+            return Ok(part);
+        }
+        let (excess, excess_95) = excess(&part.uncertainty, 1.0 / thin as f64);
+        let next = (thin / GROWTH).max(1);
+        let met = options.target_rmse_excess.is_some_and(|target| excess_95 <= target);
+        let grown = began.elapsed().mul_f64(thin as f64 / next as f64);
+        let out_of_time = options.time_budget.is_some_and(|budget| !fits(budget, clock.elapsed() + grown));
+        if met || out_of_time {
+            part.subset = Some(Subset { of: part.samples * thin, excess, excess_95, out_of_time: out_of_time && !met });
+            return Ok(part);
+        }
+        thin = next;
+    }
+}
+
+fn fits(budget: Duration, needed: Duration) -> bool {
+    needed.as_secs_f64() <= RESERVE * budget.as_secs_f64()
+}
+
+/// Expected excess of the rmse over all samples of a fit to the share `share` of them, and its 95 % bound.
+///
+/// The parameters of the part scatter about those of the whole by the part's own covariance times (1 − share), whatever the residuals
+/// are: it is the drawing of the part that is random. The cost over all exceeds its minimum by δᵀAδ, a sum of χ² variables whose first two
+/// moments give the bound (Satterthwaite 1946).
+fn excess(part: &Uncertainty, share: f64) -> (f64, f64) {
+    let known: Vec<usize> = (0..part.errors.len()).filter(|&i| part.errors[i].is_some()).collect();
+    let pick = |m: &nalgebra::DMatrix<f64>| m.select_rows(&known).select_columns(&known);
+    let product = pick(&part.normal) * pick(&part.drawn);
+    let (first, second) = (product.trace(), (&product * &product).trace());
+    if !(first > 0.0 && second > 0.0 && part.cost > 0.0) {
+        return (0.0, 0.0);
+    }
+    let relative = |rise: f64| (1.0 + (1.0 - share) * rise / part.cost).sqrt() - 1.0;
+    let bound = second / first * chi_square_quantile(0.95, first * first / second);
+    (relative(first), relative(bound))
+}
