@@ -14,9 +14,8 @@ pub mod phong;
 pub mod spec;
 
 pub use file::{
-    BootstrapRecord, Correlation, EnergyRecord, FitRecord, LobeRecord, MaterialError, ModelCandidate, ModelChoice, ResidualRecord,
-    SearchRecord,
-    SubsetRecord,
+    BootstrapRecord, Correlation, EnergyRecord, FitRecord, LobeRecord, MaterialError, ModelCandidate, ModelChoice,
+    ResidualRecord, SearchRecord, SubsetRecord,
 };
 pub use lobe::{Lobe, LobeKind, Parameter};
 pub use material::{LobeTerm, Material, PerChannel, Reflectance};

@@ -301,7 +301,8 @@ mod tests {
 
     #[test]
     fn many_coordinates_at_once_are_the_lobes_themselves() {
-        let coordinates: Vec<f64> = [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, 30.0, f64::INFINITY].map(|x: f64| -x).to_vec();
+        let coordinates: Vec<f64> =
+            [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, 30.0, f64::INFINITY].map(|x: f64| -x).to_vec();
         for lobe in [&Phong as &dyn Lobe, &Phong2d] {
             for n in [1e-300, 0.01, 1.0, 7.0, 123.0, 5e4, 1e8] {
                 let (mut values, mut derivatives) = (vec![0.0; 10], vec![vec![0.0; 10]]);
@@ -314,7 +315,8 @@ mod tests {
                     assert!((values[i] - value).abs() <= bound, "n {n} x {x}: {} vs {value}", values[i]);
                     // The two terms of the slope cancel near its root: judge by their size.
                     let size = value * (1.0 / (n + 2.0) + if x.is_finite() { x.abs() } else { 0.0 });
-                    let near = (derivatives[0][i] - slope[0]).abs() <= 1e-13 * (1.0 + (n * x).abs().min(750.0)) * size + 1e-280;
+                    let near = (derivatives[0][i] - slope[0]).abs()
+                        <= 1e-13 * (1.0 + (n * x).abs().min(750.0)) * size + 1e-280;
                     assert!(near, "n {n} x {x}: {} vs {}", derivatives[0][i], slope[0]);
                     if x.is_finite() {
                         assert!((norm * (n * x).exp() - value).abs() <= 1e-15 * value);

@@ -338,7 +338,8 @@ fn evidence(record: &FitRecord) -> String {
             Some(excess) => format!("; the next minimum costs {:.2} % more", 100.0 * excess),
             None => String::new(),
         };
-        let unseen = s.unseen_chance.map_or(String::new(), |p| format!("; chance of one not seen {:.1} % a start", 100.0 * p));
+        let unseen =
+            s.unseen_chance.map_or(String::new(), |p| format!("; chance of one not seen {:.1} % a start", 100.0 * p));
         let _ = writeln!(t, "  search: {} of {} starts end in the lowest minimum{others}{unseen}", s.reached, s.starts);
     }
     if let Some(s) = &record.subset {

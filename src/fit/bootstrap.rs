@@ -39,11 +39,13 @@ pub(super) fn bootstrap(
         let solution = if problem.is_transformable() {
             let (transform, energy) = passes::transform(&redrawn);
             let search = Search::new(&problem, &transform, &energy);
-            let found = solver::minimize(&search, lm, start, options.max_iterations).map_err(|e| failed(e.to_string()))?;
+            let found =
+                solver::minimize(&search, lm, start, options.max_iterations).map_err(|e| failed(e.to_string()))?;
             search.solve(found.t.as_slice())
         } else {
             let streamed = Streamed::from(&problem, part.solution.clone());
-            let found = solver::minimize(&streamed, lm, start, options.max_iterations).map_err(|e| failed(e.to_string()))?;
+            let found =
+                solver::minimize(&streamed, lm, start, options.max_iterations).map_err(|e| failed(e.to_string()))?;
             streamed.solve(found.t.as_slice())
         };
         let moved = flat(&solution) - &centre;

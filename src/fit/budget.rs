@@ -45,7 +45,8 @@ pub(super) fn fit(
     let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
     loop {
         let began = Instant::now();
-        let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 })?;
+        let (samples, transforms) =
+            Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 })?;
         let mut part = part::fit(&samples, transforms, model, ranges, options)?;
         if thin == 1 {
             return Ok(part);

@@ -131,7 +131,10 @@ fn choose(candidates: Vec<ModelCandidate>) -> ModelChoice {
         }
     } else {
         let gain = 100.0 * (own / least - 1.0);
-        format!("the simplest model within {:.0} % of the lowest held-out error ({best}, {gain:.2} % lower)", 100.0 * AS_GOOD)
+        format!(
+            "the simplest model within {:.0} % of the lowest held-out error ({best}, {gain:.2} % lower)",
+            100.0 * AS_GOOD
+        )
     };
     ModelChoice { chosen: name, reason, candidates }
 }

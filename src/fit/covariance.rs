@@ -107,7 +107,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
                     let squares = if has_sigma { &sums.squares } else { &sums.spread };
                     normal[(a, b)] += both * sums.normal[(i.max(j), i.min(j))];
                     drawn[(a, b)] += both * squares[(i.max(j), i.min(j))];
-                    spread[(a, b)] += both * (sums.known[(i.max(j), i.min(j))] + inflation * sums.spread[(i.max(j), i.min(j))]);
+                    spread[(a, b)] +=
+                        both * (sums.known[(i.max(j), i.min(j))] + inflation * sums.spread[(i.max(j), i.min(j))]);
                 }
                 common.iter_mut().zip(&sums.common).for_each(|(total, part)| total[a] += strength[i] * part[i]);
             }

@@ -18,7 +18,7 @@ const MOST: usize = 60;
 /// How far a descent goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Digits {
-    /// Until the cost no longer tells points apart.
+    /// Until the cost hardly tells points apart.
     Rough,
     /// To the last.
     All,
@@ -49,7 +49,7 @@ pub(super) fn polish(
     let joint = Joint { problem, dense };
     let ranges = problem.ranges.iter().flatten().chain(&problem.bounds).copied().collect();
     let (ftol, polish) = match digits {
-        Digits::Rough => (1e-10, 0),
+        Digits::Rough => (1e-9, 60),
         Digits::All => (1e-15, 60),
     };
     let options = SolverOptions { rank_tol: 1e-14, ftol, polish, ..SolverOptions::default() };
@@ -84,7 +84,10 @@ impl Joint<'_> {
             let (place, strength) = self.columns(at, c);
             for (i, &a) in place.iter().enumerate() {
                 gradient[a] += strength[i] * sums.gradient[i];
-                place.iter().enumerate().for_each(|(j, &b)| normal[(a, b)] += strength[i] * strength[j] * sums.normal[(i, j)]);
+                place
+                    .iter()
+                    .enumerate()
+                    .for_each(|(j, &b)| normal[(a, b)] += strength[i] * strength[j] * sums.normal[(i, j)]);
             }
         }
         Linearization::from_normal(sums.iter().map(|s| s.cost).sum(), normal, &gradient)

@@ -85,7 +85,8 @@ impl FromStr for ParameterName {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let text = text.trim();
-        let (lobe, field) = text.split_once('.').ok_or_else(|| format!("\"{text}\" is no parameter: expected LOBE.NAME"))?;
+        let (lobe, field) =
+            text.split_once('.').ok_or_else(|| format!("\"{text}\" is no parameter: expected LOBE.NAME"))?;
         let (name, occurrence) = bracketed(lobe)?;
         let occurrence = match occurrence {
             None => 0,
@@ -236,7 +237,8 @@ mod tests {
             let limits: Vec<Limit> = limits.iter().map(|l| Limit::range(l).expect("a range")).collect();
             Ranges::new(&model.parse().expect("a model"), &channels, &limits)
         };
-        let got = ranges("lambert+phong+phong", &["phong[1].exponent=1..1e4", "lambert.weight[g]=0..0.5"]).expect("fine");
+        let got =
+            ranges("lambert+phong+phong", &["phong[1].exponent=1..1e4", "lambert.weight[g]=0..0.5"]).expect("fine");
         assert_eq!(got.shapes, [(0.01, 1e8), (1.0, 1e4)]);
         assert_eq!(got.weights[1][0], (0.0, 0.5));
         assert_eq!(got.weights[0][0], (0.0, f64::INFINITY));

@@ -130,7 +130,8 @@ impl Loss {
             }
             Self::CubeRoot => {
                 let root = cube_root(cos_i * f);
-                let steep = cube_root((cos_i * f).max(CUBE_FLOOR));
+                let u = cos_i * f;
+                let steep = cube_root(if u > CUBE_FLOOR { u } else { CUBE_FLOOR });
                 (root - cube_root(cos_i * y), cos_i / (3.0 * steep * steep))
             }
             Self::L2 | Self::CosineL2 | Self::Relative => (gain * (f - y), gain),
@@ -138,15 +139,15 @@ impl Loss {
     }
 }
 
-/// ∛u to a unit in the last place.
+/// ∛u to a unit in the last place; of values below 10⁻³⁰⁰, ±10⁻¹⁰⁰.
 #[inline(always)]
 fn cube_root(u: f64) -> f64 {
     let size = u.abs();
+    let size = if size > 1e-300 { size } else { 1e-300 };
     let root = exp(ln(size) * (1.0 / 3.0));
     // One Newton step on root³ = u takes the last digits.
     let root = root - (root * root).mul_add(root, -size) / (3.0 * root * root);
-    let root = if size < f64::MIN_POSITIVE { 0.0 } else { root };
-    if u < 0.0 { -root } else { root }
+    root.copysign(u)
 }
 
 /// Smallest c·f (in the fit's scale, where the largest value is about 1) whose cube root's slope is told apart.
@@ -305,7 +306,10 @@ mod tests {
                             let by_n = derivative(model(C::new(weight, 0.0), C::new(n, STEP)));
                             let got = slope * weight * g;
                             let size = slope * weight * phi * (1.0 / n + x.abs());
-                            assert!((got - by_n).abs() <= 1e-9 * size.max(1e-12), "{loss:?} {kind:?} n {n} x {x}: {got:e} {by_n:e}");
+                            assert!(
+                                (got - by_n).abs() <= 1e-9 * size.max(1e-12),
+                                "{loss:?} {kind:?} n {n} x {x}: {got:e} {by_n:e}"
+                            );
                         }
                     }
                 }
@@ -319,7 +323,9 @@ mod tests {
             LobeKind::Lambert => C::new(1.0 / PI, 0.0),
             LobeKind::Lambert2d => C::new(0.5, 0.0),
             LobeKind::Phong => (n + 2.0) / TAU * (n * x).exp(),
-            LobeKind::Phong2d => ((ln_gamma((n + 3.0) / 2.0) - ln_gamma((n + 2.0) / 2.0)).exp() / PI.sqrt()) * (n * x).exp(),
+            LobeKind::Phong2d => {
+                ((ln_gamma((n + 3.0) / 2.0) - ln_gamma((n + 2.0) / 2.0)).exp() / PI.sqrt()) * (n * x).exp()
+            }
         }
     }
 

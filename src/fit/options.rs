@@ -152,7 +152,9 @@ pub enum FitError {
         expected: String,
     },
     /// Limits that can't all be met.
-    #[error("channel {channel}: the least weights allowed reflect {least} in all, more than the light that energy conservation leaves")]
+    #[error(
+        "channel {channel}: the least weights allowed reflect {least} in all, more than the light that energy conservation leaves"
+    )]
     Infeasible {
         /// The channel.
         channel: String,

@@ -248,8 +248,7 @@ impl<'a, const K: usize> Kernel for Tally<'a, K> {
             let rest = columns[a].1;
             self.into.gradient[a] += gradient[a].iter().sum::<f64>() + plain_dot(pull_rest, rest);
             for b in 0..=a {
-                let last: f64 =
-                    weight_rest.iter().zip(rest).zip(columns[b].1).map(|((w, x), y)| w * x * y).sum();
+                let last: f64 = weight_rest.iter().zip(rest).zip(columns[b].1).map(|((w, x), y)| w * x * y).sum();
                 self.into.products[(a, b)] += products[a][b].iter().sum::<f64>() + last;
             }
         }
@@ -292,16 +291,19 @@ fn omega(samples: &Samples<'_>, block: &Block) -> Vec<Vec<f64>> {
 pub(super) fn transform(samples: &Samples<'_>) -> Transforms {
     // Each piece has its own sums: few enough that adding them costs nothing, and as many whatever the number of threads.
     let (lists, channels) = (samples.lists(), samples.channels.len());
-    let parts = samples.map_pieces(|| (Transform::new(lists + channels), vec![0.0; channels]), |sums, block| {
-        let mut values = omega(samples, block);
-        for c in 0..channels {
-            let weight = &values[if lists == 1 { 0 } else { c }];
-            let wy: Vec<f64> = weight.iter().zip(&block.y[c]).map(|(w, y)| w * y).collect();
-            sums.1[c] += vectorised(Dot(&wy, &block.y[c]));
-            values.push(wy);
-        }
-        sums.0.absorb(&block.x, &values);
-    });
+    let parts = samples.map_pieces(
+        || (Transform::new(lists + channels), vec![0.0; channels]),
+        |sums, block| {
+            let mut values = omega(samples, block);
+            for c in 0..channels {
+                let weight = &values[if lists == 1 { 0 } else { c }];
+                let wy: Vec<f64> = weight.iter().zip(&block.y[c]).map(|(w, y)| w * y).collect();
+                sums.1[c] += vectorised(Dot(&wy, &block.y[c]));
+                values.push(wy);
+            }
+            sums.0.absorb(&block.x, &values);
+        },
+    );
     let mut total = (Transform::new(lists + channels), vec![0.0; channels]);
     for (part, energy) in &parts {
         total.0.merge(part);
@@ -439,48 +441,109 @@ struct Evaluate<'a> {
     out: Out<'a>,
 }
 
+/// r and ∂r/∂f from f, cosθi, the gain of a linear loss and y. A trait, so that each loss has loops of its own, inlined into the kernel.
+trait Residual {
+    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64);
+}
+
+/// s²ρ and ρ′ of a residual.
+trait Trust: Copy {
+    fn at(self, r: f64) -> (f64, f64);
+}
+
+struct Plain;
+struct Log;
+struct CubeRoot;
+
+impl Residual for Plain {
+    #[inline(always)]
+    fn at(f: f64, _cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
+        (gain * (f - y), gain)
+    }
+}
+
+impl Residual for Log {
+    #[inline(always)]
+    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
+        Loss::Log.evaluate(f, cos_i, gain, y)
+    }
+}
+
+impl Residual for CubeRoot {
+    #[inline(always)]
+    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
+        Loss::CubeRoot.evaluate(f, cos_i, gain, y)
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Full;
+
+/// Huber's or Cauchy's loss with s² and 1/s².
+#[derive(Clone, Copy)]
+struct Huber(f64, f64);
+#[derive(Clone, Copy)]
+struct Cauchy(f64, f64);
+
+impl Trust for Full {
+    #[inline(always)]
+    fn at(self, r: f64) -> (f64, f64) {
+        (r * r, 1.0)
+    }
+}
+
+impl Trust for Huber {
+    #[inline(always)]
+    fn at(self, r: f64) -> (f64, f64) {
+        let (rho, weight, _) = RobustKind::Huber.rho(r * r * self.1);
+        (self.0 * rho, weight)
+    }
+}
+
+impl Trust for Cauchy {
+    #[inline(always)]
+    fn at(self, r: f64) -> (f64, f64) {
+        let (rho, weight, _) = RobustKind::Cauchy.rho(r * r * self.1);
+        (self.0 * rho, weight)
+    }
+}
+
 impl Kernel for Evaluate<'_> {
     type Output = f64;
 
     #[inline(always)]
     fn run(self) -> f64 {
-        // One loop a loss, so that each is free of branches.
         match self.loss {
-            Loss::Log => self.of_loss(|f, c, g, y| Loss::Log.evaluate(f, c, g, y)),
-            Loss::CubeRoot => self.of_loss(|f, c, g, y| Loss::CubeRoot.evaluate(f, c, g, y)),
-            _ => self.of_loss(|f, _, g, y| (g * (f - y), g)),
+            Loss::Log => self.of_loss::<Log>(),
+            Loss::CubeRoot => self.of_loss::<CubeRoot>(),
+            Loss::L2 | Loss::CosineL2 | Loss::Relative => self.of_loss::<Plain>(),
         }
     }
 }
 
 impl Evaluate<'_> {
     #[inline(always)]
-    fn of_loss(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64)) -> f64 {
-        let Some((kind, s)) = self.saturation else { return self.each(residual, |r| (r * r, 1.0)) };
-        let (square, inverse) = (s * s, 1.0 / (s * s));
-        match kind {
-            RobustKind::Huber => self.each(residual, |r| {
-                let (rho, weight, _) = RobustKind::Huber.rho(r * r * inverse);
-                (square * rho, weight)
-            }),
-            RobustKind::Cauchy => self.each(residual, |r| {
-                let (rho, weight, _) = RobustKind::Cauchy.rho(r * r * inverse);
-                (square * rho, weight)
-            }),
+    fn of_loss<R: Residual>(self) -> f64 {
+        match self.saturation {
+            None => self.each::<R, Full>(Full),
+            Some((RobustKind::Huber, s)) => self.each::<R, Huber>(Huber(s * s, 1.0 / (s * s))),
+            Some((RobustKind::Cauchy, s)) => self.each::<R, Cauchy>(Cauchy(s * s, 1.0 / (s * s))),
         }
     }
 
     #[inline(always)]
-    fn each(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64), rho: impl Fn(f64) -> (f64, f64)) -> f64 {
+    fn each<R: Residual, T: Trust>(self, rho: T) -> f64 {
         let n = self.data.f.len();
         let Data { f, cos_i, y, w } = self.data;
         let (f, cos_i, y, w) = (&f[..n], &cos_i[..n], &y[..n], &w[..n]);
         let (r, slope, trust, pull) =
             (&mut self.out.r[..n], &mut self.out.slope[..n], &mut self.out.trust[..n], &mut self.out.pull[..n]);
         for i in 0..n {
-            (r[i], slope[i]) = residual(f[i], cos_i[i], slope[i], y[i]);
+            (r[i], slope[i]) = R::at(f[i], cos_i[i], slope[i], y[i]);
+        }
+        for i in 0..n {
             // The cost waits where the pull will stand.
-            (pull[i], trust[i]) = rho(r[i]);
+            (pull[i], trust[i]) = rho.at(r[i]);
         }
         let cost = dot(w, pull);
         for i in 0..n {

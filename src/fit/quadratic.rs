@@ -39,7 +39,9 @@ pub(super) fn minimise(gram: &DMatrix<f64>, b: &DVector<f64>, feasible: &Feasibl
     let mut best: Option<(f64, DVector<f64>)> = None;
     for stands in feasible.stands() {
         for capped in [false, true] {
-            let Some(x) = stationary(gram, b, feasible, &stands, capped).filter(|x| feasible.holds(x)) else { continue };
+            let Some(x) = stationary(gram, b, feasible, &stands, capped).filter(|x| feasible.holds(x)) else {
+                continue;
+            };
             let value = value(&x);
             if best.as_ref().is_none_or(|(least, _)| value < *least) {
                 best = Some((value, x));
@@ -203,7 +205,8 @@ mod tests {
             assert!(feasible.holds(&x), "{x}");
             let steps = 24;
             for k in 0..(steps + 1i32).pow(3) {
-                let at = |k: i32, (low, high): (f64, f64)| low + (high.min(2.0) - low) * f64::from(k) / f64::from(steps);
+                let at =
+                    |k: i32, (low, high): (f64, f64)| low + (high.min(2.0) - low) * f64::from(k) / f64::from(steps);
                 let (i, j, l) = (k % 25, k / 25 % 25, k / 625);
                 let other = dvector![at(i, ranges[0]), at(j, ranges[1]), at(l, ranges[2])];
                 assert!(!feasible.holds(&other) || value(&other) >= value(&x) - 1e-12, "{other} below {x}");

@@ -6,8 +6,8 @@ use super::options::{FitOptions, WeightMode};
 use super::part::Part;
 use super::solver::Stop;
 use crate::brdf::{
-    BootstrapRecord, Correlation, FitRecord, LobeKind, LobeRecord, LobeTerm, Material, ModelSpec, PerChannel, ResidualRecord,
-    SearchRecord, SubsetRecord,
+    BootstrapRecord, Correlation, FitRecord, LobeKind, LobeRecord, LobeTerm, Material, ModelSpec, PerChannel,
+    ResidualRecord, SearchRecord, SubsetRecord,
 };
 use crate::measurement::Measurement;
 

@@ -302,7 +302,8 @@ impl PowerColumns {
         for (i, first) in self.list.iter().enumerate().filter(|(_, column)| column.lobe == a) {
             for (j, second) in self.list.iter().enumerate().filter(|(_, column)| column.lobe == b) {
                 let cross = first.constant * second.linear + first.linear * second.constant;
-                let sum = first.constant * second.constant * jet[0] + cross * jet[1] + first.linear * second.linear * jet[2];
+                let sum =
+                    first.constant * second.constant * jet[0] + cross * jet[1] + first.linear * second.linear * jet[2];
                 gram[(i, j)] = sum;
                 gram[(j, i)] = sum;
             }
@@ -509,7 +510,9 @@ fn joint_step(problem: &Problem<'_>, moments: &Moments, at: &Solution, sums: &[S
     let free: Vec<usize> = (0..p).filter(|&i| !held(i)).collect();
     let solved = solve_free(&normal.select_rows(&free).select_columns(&free), &by_t.select_rows(&free));
     let mut t = at.t.clone();
-    free.iter().zip(solved.iter()).for_each(|(&i, v)| t[i] = (t[i] - v).clamp(problem.bounds[i].0, problem.bounds[i].1));
+    free.iter()
+        .zip(solved.iter())
+        .for_each(|(&i, v)| t[i] = (t[i] - v).clamp(problem.bounds[i].0, problem.bounds[i].1));
     let step = DVector::from_fn(p, |i, _| t[i] - at.t[i]);
     let follow = |(c, x): (usize, &DVector<f64>)| {
         let cross = moments.gram(c).view((0, k), (k, p)) * step.component_mul(&strength(x));

@@ -4,17 +4,20 @@
 //! plain fit's spread is too large where outliers pull it; as they let go it shrinks, and the parameters follow.
 
 use super::joint::Digits;
+use super::loss::Robust;
 use super::options::{FitError, FitOptions};
 use super::part::{SMALL, descend};
 use super::passes::Scratch;
 use super::reduced::{Problem, Solution, Streamed};
 use super::start;
 
-/// Rounds in which s settles, and the relative change at which it has: of small tables and of others, where each round takes passes
-/// and the parameters' own errors are far larger.
+/// Rounds in which s settles at most.
 const ROUNDS: usize = 60;
+/// Relative change at which s has settled, on small tables, on others, where each round takes passes and the parameters' own errors are far
+/// larger, and on the part of the samples that says where to begin.
 const SETTLED: f64 = 1e-12;
-const SETTLED_LARGE: f64 = 1e-7;
+const SETTLED_LARGE: f64 = 1e-5;
+const SETTLED_PART: f64 = 1e-3;
 /// Relative change from which on the parameters are followed to their last digits.
 const FINE: f64 = 1e-4;
 /// Most that s shrinks in a round: the parameters must be able to follow.
@@ -28,26 +31,38 @@ pub(super) fn settle(
     plain: Solution,
     options: &FitOptions,
 ) -> Result<Solution, FitError> {
+    let Some(robust) = options.robust else { return Ok(plain) };
     let steps = options.max_iterations;
-    let scale = |problem: &Problem<'_>, at: &Solution| spread(problem, at) * options.robust.map_or(1.0, |r| r.scale);
-    let set = |problem: &mut Problem<'_>, s: f64| problem.saturation = options.robust.map(|r| (r.kind, s));
-    let mut s = scale(problem, &plain);
-    set(problem, s);
     let (mut few, mut more) = parts;
-    (few.saturation, more.saturation) = (problem.saturation, problem.saturation);
+    let saturation = Some((robust.kind, robust.scale * spread(&more, &plain)));
+    (few.saturation, more.saturation) = (saturation, saturation);
     // Outliers may have drawn the plain fit into another valley: the robust cost has the last word on where to go on.
     let other = start::search_streamed(&few, &more, steps)?;
-    let other = Streamed::new(problem).solve(other.outcome.t.as_slice());
-    let (mut at, other) = (descend(problem, plain, steps, Digits::Rough)?.0, descend(problem, other, steps, Digits::Rough)?.0);
-    if other.cost < at.cost {
-        at = other;
-    }
-    // ln(new s) − ln(old s) is brought to 0 by secants, within the bracket that is known.
-    let (mut last, mut bracket): (Option<(f64, f64)>, (f64, f64)) = (None, (f64::NEG_INFINITY, f64::INFINITY));
+    let other = Streamed::new(&more).solve(other.outcome.t.as_slice());
+    let candidates = [plain, other].map(|start| descend(&more, start, steps, Digits::Rough));
+    let [plain, other] = candidates;
+    let (plain, other) = (plain?.0, other?.0);
+    let at = if other.cost < plain.cost { other } else { plain };
+    let whole = more.samples.len() == problem.samples.len();
+    let at = if whole { at } else { follow(&mut more, at, robust, steps, SETTLED_PART)? };
     let small = problem.samples.residuals() <= SMALL;
-    let settled = if small { SETTLED } else { SETTLED_LARGE };
+    problem.saturation = more.saturation;
+    follow(problem, at, robust, steps, if small { SETTLED } else { SETTLED_LARGE })
+}
+
+/// Brings ln(new s) − ln(old s) to 0 by secants, within the bracket that is known; the parameters follow.
+fn follow(
+    problem: &mut Problem<'_>,
+    start: Solution,
+    robust: Robust,
+    steps: u64,
+    settled: f64,
+) -> Result<Solution, FitError> {
+    let mut at = start;
+    let mut s = problem.saturation.map_or(1.0, |(_, s)| s);
+    let (mut last, mut bracket): (Option<(f64, f64)>, (f64, f64)) = (None, (f64::NEG_INFINITY, f64::INFINITY));
     for _ in 0..ROUNDS {
-        let (here, wanted) = (s.ln(), scale(problem, &at).ln());
+        let (here, wanted) = (s.ln(), (robust.scale * spread(problem, &at)).ln());
         let excess = wanted - here;
         if excess.abs() <= settled {
             break;
@@ -61,8 +76,8 @@ pub(super) fn settle(
         }
         last = Some((here, excess));
         s = next.max(here + SHRINK.ln()).exp();
-        set(problem, s);
-        let digits = if small && excess.abs() < FINE { Digits::All } else { Digits::Rough };
+        problem.saturation = Some((robust.kind, s));
+        let digits = if settled <= SETTLED && excess.abs() < FINE { Digits::All } else { Digits::Rough };
         at = descend(problem, at, steps, digits)?.0;
     }
     Ok(at)
@@ -106,4 +121,3 @@ fn median(list: &mut [f64]) -> f64 {
     let (below, upper, _) = list.select_nth_unstable_by(middle, f64::total_cmp);
     if odd { *upper } else { 0.5 * (*upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max)) }
 }
-

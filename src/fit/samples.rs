@@ -286,7 +286,15 @@ impl<'a> Samples<'a> {
                 for line in lines.lines(b) {
                     let on_line = planes.map(|plane| &plane[line.entries()]);
                     let (x_out, sums_out) = (&mut x, &mut values[..]);
-                    vectorised(Folded { lines, line: &line, values: on_line, cosine, x: x_out, sums: sums_out, seen: &mut seen });
+                    vectorised(Folded {
+                        lines,
+                        line: &line,
+                        values: on_line,
+                        cosine,
+                        x: x_out,
+                        sums: sums_out,
+                        seen: &mut seen,
+                    });
                     sums.absorb(&x, &values);
                 }
             }
@@ -318,7 +326,8 @@ impl<'a> Samples<'a> {
     fn lines(&self, options: &FitOptions, solid_angle: bool) -> Option<MerlLines> {
         let Directions::Merl(grid) = self.measurement.directions else { return None };
         let own = !solid_angle || matches!(self.measurement.weights, crate::measurement::Weights::Merl);
-        let plain = options.loss.is_linear() && options.robust.is_none() && !options.use_sigma && options.stride == 1 && own;
+        let plain =
+            options.loss.is_linear() && options.robust.is_none() && !options.use_sigma && options.stride == 1 && own;
         plain.then(|| MerlLines::new(grid, least_cos(options), solid_angle))
     }
 
@@ -370,7 +379,8 @@ impl<'a> Samples<'a> {
         start: impl Fn() -> T + Sync + Send,
         add: impl Fn(&mut T, &Block) + Sync + Send,
     ) -> Vec<T> {
-        let plain = self.measurement.sigma.is_none() && self.measurement.common.is_empty() && self.loss != Loss::Relative;
+        let plain =
+            self.measurement.sigma.is_none() && self.measurement.common.is_empty() && self.loss != Loss::Relative;
         let folds = plain && matches!(self.source, Source::Merl(_));
         let block = || Block { swapped: folds.then(Box::default), ..Block::default() };
         self.pieces(block, start, add)
@@ -530,7 +540,14 @@ impl<'a> Samples<'a> {
     fn settle(&mut self, survey: &Survey, options: &FitOptions) -> Result<(), FitError> {
         if survey.directions == 0 {
             // Only a table comes here: the lists say themselves what is missing.
-            let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle: false, kind: None, thin: Thin::NONE };
+            let judge = Judge {
+                samples: self,
+                options,
+                least_cos: least_cos(options),
+                solid_angle: false,
+                kind: None,
+                thin: Thin::NONE,
+            };
             let reasons = sum::map_blocks(self.measurement.len(), |range| judge.list(range).1);
             let mut left = Left::default();
             reasons.iter().for_each(|r| left.add(r));
@@ -757,7 +774,7 @@ impl Judge<'_> {
         let (mut block, mut left) = (Block::default(), Left::default());
         block.reset(channels, channels);
         let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
-                let counts = |e: &usize| e.is_multiple_of(self.options.stride) && self.thin.keeps(*e);
+        let counts = |e: &usize| e.is_multiple_of(self.options.stride) && self.thin.keeps(*e);
         for entry in range.filter(counts) {
             left.entries += 1;
             let (wi, wo) = self.samples.measurement.directions.pair(entry);
@@ -784,7 +801,8 @@ impl Judge<'_> {
     /// Weights and values of an entry, channel by channel, 0 where masked; false where all are.
     fn values(&self, entry: usize, cos_i: f64, w: &mut [f64], y: &mut [f64], left: &mut Left) -> bool {
         let (samples, loss) = (self.samples, self.samples.loss);
-        let weight = if self.solid_angle && !self.options.use_sigma { samples.measurement.weights.get(entry) } else { 1.0 };
+        let weight =
+            if self.solid_angle && !self.options.use_sigma { samples.measurement.weights.get(entry) } else { 1.0 };
         let mut any = false;
         for (c, &channel) in samples.channels.iter().enumerate() {
             (w[c], y[c]) = (0.0, 0.0);

@@ -271,8 +271,7 @@ impl Lattice {
         // The closed set of lobes sees to it that the shaped ones of a model are of one kind.
         let kind = problem.kinds[shaped[0]];
         let plain = base.iter().map(|&l| ShapedLobe { kind: problem.kinds[l], shape: Vec::new() });
-        let lobes: Vec<ShapedLobe> =
-            plain.chain(t.iter().map(|t| ShapedLobe { kind, shape: vec![t.exp()] })).collect();
+        let lobes: Vec<ShapedLobe> = plain.chain(t.iter().map(|t| ShapedLobe { kind, shape: vec![t.exp()] })).collect();
         let moments = search.moments(&lobes, false);
         Self { base, shaped, gram: moments.gram, data: moments.data, energy: search.energy.iter().sum() }
     }

@@ -287,7 +287,10 @@ mod tests {
                         // e^{sx} on its own octave: an error of 1e-13 relative to what the samples nearby contribute.
                         if x.is_finite() { v.abs() * x.abs().powi(order as i32) * (s * x * 0.5).exp() } else { 0.0 }
                     }));
-                    assert!((got - want).abs() <= 1e-12 * size, "s {s} measure {m} order {order}: {got:e} {want:e} of {size:e}");
+                    assert!(
+                        (got - want).abs() <= 1e-12 * size,
+                        "s {s} measure {m} order {order}: {got:e} {want:e} of {size:e}"
+                    );
                 }
                 if m > 0 {
                     assert!((merged[m - 1][0] - jet[0]).abs() <= 1e-12 * jet[0].abs().max(1.0), "s {s}");

@@ -82,12 +82,12 @@ pub fn ln(x: f64) -> f64 {
     let s = f / (2.0 + f);
     let z = s * s;
     let w = z * z;
-    let odd = w * w.mul_add(w.mul_add(1.531_383_769_920_937_3e-1, 2.222_219_843_214_978_4e-1), 3.999_999_999_940_942e-1);
-    let even = z
-        * w.mul_add(
-            w.mul_add(w.mul_add(1.479_819_860_511_658_6e-1, 1.818_357_216_161_805e-1), 2.857_142_874_366_239e-1),
-            6.666_666_666_666_735e-1,
-        );
+    let odd =
+        w * w.mul_add(w.mul_add(1.531_383_769_920_937_3e-1, 2.222_219_843_214_978_4e-1), 3.999_999_999_940_942e-1);
+    let even = z * w.mul_add(
+        w.mul_add(w.mul_add(1.479_819_860_511_658_6e-1, 1.818_357_216_161_805e-1), 2.857_142_874_366_239e-1),
+        6.666_666_666_666_735e-1,
+    );
     let half_square = 0.5 * f * f;
     let small = s.mul_add(half_square + (odd + even), k * LN_2[1]);
     k.mul_add(LN_2[0], f - (half_square - small))
@@ -176,7 +176,8 @@ mod tests {
     fn elementary_functions_match_the_standard_library() {
         let x: Vec<f64> = (0..20_000).map(|i| -0.035 * f64::from(i) + 3.0).collect();
         compare(exp, f64::exp, &x[..20_000], 3e-16);
-        let x: Vec<f64> = (-9000..9000).map(|i| (f64::from(i) * 0.0777).exp2() * 1.234).filter(|x| x.is_normal()).collect();
+        let x: Vec<f64> =
+            (-9000..9000).map(|i| (f64::from(i) * 0.0777).exp2() * 1.234).filter(|x| x.is_normal()).collect();
         compare(ln, f64::ln, &x, 3e-16);
         let x: Vec<f64> = (0..2000).map(|i| -(f64::from(-i) * 0.03).exp2() * 0.999).collect();
         compare(ln_1p, f64::ln_1p, &x, 6e-16);
