@@ -370,9 +370,10 @@ fn evidence(record: &FitRecord, channels: &[String]) -> String {
     }
     if let Some(r) = &record.residual {
         let from = if r.noise_from == "sigma" { "as the file states" } else { "from neighbours" };
-        let model = if r.model_rmse > 0.0 { format!("{:.2e}", r.model_rmse) } else { "none beyond that".into() };
+        let model =
+            if r.model_rmse > 0.0 { format!("model error {:.2e}", r.model_rmse) } else { "no model error seen".into() };
         say(format!(
-            "residuals: noise {:.2e} ({from}), model error {model}; worth {:.0} independent ones",
+            "residuals: noise {:.2e} ({from}), {model}; worth {:.0} samples",
             r.noise_rmse, r.effective_samples
         ));
     }
@@ -381,7 +382,10 @@ fn evidence(record: &FitRecord, channels: &[String]) -> String {
     }
     // A single shape is bracketed over its whole range: nothing to add unless another minimum is nearly as low.
     if let Some(s) = record.search.as_ref().filter(|s| s.unseen_chance.is_some() || s.runner_up_excess < Some(RIVAL)) {
-        let others = s.runner_up_excess.map_or(String::new(), |e| format!("; the next costs {} more", percent(e)));
+        let more = |e: f64| {
+            if e < 1.0 { format!("{} more", percent(e)) } else { format!("{} times as much", digits(1.0 + e)) }
+        };
+        let others = s.runner_up_excess.map_or(String::new(), |e| format!("; the next costs {}", more(e)));
         let unseen = s
             .unseen_chance
             .map_or(String::new(), |p| format!("; another start finds a new one by a chance of {}", percent(p)));

@@ -17,6 +17,8 @@ fn every_command_prints_exactly_one_json_object() {
         vec!["fit", "p.csv"],
         vec!["fit", "p.csv", "--out", "f.json"],
         vec!["fit", "p.csv", "--log"],
+        vec!["fit", "p.csv", "--model", "auto", "--robust", "huber"],
+        vec!["fit", "p.csv", "--per-channel", "--bootstrap", "2"],
         with(&["render", "--material", "p.json", "--out", "r.exr"]),
         with(&["render", "--material", "p.csv", "--out", "r.exr", "--png", "r.png"]),
         with(&["validate", "p.csv", "p.json", "--out", "v"]),
