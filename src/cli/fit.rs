@@ -381,7 +381,9 @@ fn evidence(record: &FitRecord, channels: &[String]) -> String {
         say(format!("energy: reflects {:.1} % of the light at most", 100.0 * e.largest));
     }
     // A single shape is bracketed over its whole range: nothing to add unless another minimum is nearly as low.
-    if let Some(s) = record.search.as_ref().filter(|s| s.unseen_chance.is_some() || s.runner_up_excess < Some(RIVAL)) {
+    if let Some(s) =
+        record.search.as_ref().filter(|s| s.unseen_chance.is_some() || s.runner_up_excess.is_some_and(|e| e < RIVAL))
+    {
         let more = |e: f64| {
             if e < 1.0 { format!("{} more", percent(e)) } else { format!("{} times as much", digits(1.0 + e)) }
         };
