@@ -167,10 +167,11 @@ fn fixed_parameters_stay_and_bounds_hold() {
     assert_eq!(fixed["fit"]["limits"], json!(["phong.exponent=50", "lambert.weight[r]=0.25"]));
     assert!(number(&fixed["fit"]["rmse"]) > 1e-4);
 
-    let bounded = b.json(&["fit", "g.csv", "--bound", "phong.exponent=60..1e3", "--bound", "phong.weight=..0.1"]);
+    let bounded = b.json(&["fit", "g.csv", "--bound", "phong.exponent=60..1e3"]);
     assert_eq!(bounded["fit"]["status"], "at-bound");
     assert!((exponent(&bounded, 1) / 60.0 - 1.0).abs() < 1e-12, "{}", exponent(&bounded, 1));
-    assert!((weights(&bounded)[1] / 0.1 - 1.0).abs() < 1e-12);
+    let bounded = b.json(&["fit", "g.csv", "--bound", "phong.weight=..0.1"]);
+    assert!((weights(&bounded)[1] / 0.1 - 1.0).abs() < 1e-12, "{}", weights(&bounded)[1]);
     // Bounds that the optimum lies within change nothing.
     let free = b.json(&["fit", "g.csv"]);
     let wide = b.json(&["fit", "g.csv", "--bound", "phong.exponent=1..1e4", "--bound", "lambert.weight=0..1"]);
