@@ -14,72 +14,78 @@ use crate::brdf::{FitRecord, Material, ModelChoice, ModelSpec, PerChannel, SpecE
 use crate::fit::{Bootstrap, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
 use crate::measurement::{Measurement, formats};
 
+const MODEL: &str = "Model and loss";
+const SAMPLES: &str = "Samples and their weights";
+const EFFORT: &str = "Effort";
+const OUTPUT: &str = "Output";
+
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit fit gold.binary --out gold.json
   goniofit fit *.binary --model lambert+phong --out-dir fits/
-  goniofit fit gold.binary --model auto                      compare models, take the simplest good one
-  goniofit fit lab.csv --use-sigma --robust cauchy           with the file's own sigma, outliers let go
-  goniofit fit gold.binary --fix phong.exponent=50 --bound lambert.weight=0..0.3")]
+  goniofit fit gold.binary --model auto
+  goniofit fit lab.csv --use-sigma --robust cauchy
+  goniofit fit gold.binary --fix phong.exponent=50 --bound lambert.weight=0..0.3
+  goniofit fit gold.binary --target-rmse-excess 1%")]
 pub(super) struct Args {
     /// Measurements; `-` is stdin
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Lobes joined by +, or `auto` to compare models and take the simplest good one
-    #[arg(long, default_value = "lambert+phong", value_name = "SPEC|auto")]
+    #[arg(long, default_value = "lambert+phong", value_name = "SPEC|auto", help_heading = MODEL)]
     model: Wanted,
-    /// What is minimised
-    #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2|log|cuberoot|relative")]
+    /// What is minimised; docs/fit.md has the formulas
+    #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2|log|cuberoot|relative", help_heading = MODEL)]
     loss: Loss,
-    /// Let outliers count less; SCALE multiplies the residuals' σ [defaults: huber 1.345, cauchy 2.385]
-    #[arg(long, value_name = "huber|cauchy[:SCALE]")]
+    /// Let outliers count less; SCALE times the residuals' σ is where they begin [default SCALE: huber 1.345, cauchy 2.385]
+    #[arg(long, value_name = "huber|cauchy[:SCALE]", help_heading = MODEL)]
     robust: Option<Robust>,
     /// How samples count
-    #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform")]
+    #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform", help_heading = SAMPLES)]
     weights: WeightMode,
     /// Weigh by the σ that the file states, instead of the solid angle
-    #[arg(long)]
+    #[arg(long, help_heading = SAMPLES)]
     use_sigma: bool,
     /// Leave out samples with θi or θo above this, degrees
-    #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true, help_heading = SAMPLES)]
     max_angle: f64,
     /// Use every N-th entry only
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, default_value_t = 1, value_name = "N", help_heading = SAMPLES)]
     stride: usize,
     /// Let every channel have its own shapes
-    #[arg(long)]
+    #[arg(long, help_heading = MODEL)]
     per_channel: bool,
-    /// Hold a parameter at a value, phong.exponent=50 say (a second lobe of a kind: phong[1]); may be repeated
-    #[arg(long, value_name = "NAME=VALUE", value_parser = Limit::fixed)]
+    /// Hold a parameter at a value, phong.exponent=50 say; a second lobe of a kind is phong[1]; may be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = Limit::fixed, help_heading = MODEL)]
     fix: Vec<Limit>,
     /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated
-    #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range)]
+    #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range, help_heading = MODEL)]
     bound: Vec<Limit>,
     /// Fit under the constraint that no channel reflects more light than it receives
-    #[arg(long)]
+    #[arg(long, help_heading = MODEL)]
     conserve_energy: bool,
-    /// Time that the fit may take, 50ms or 2s say: it then uses as many samples as that allows
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    /// Time that the fit may take, 50ms or 2s say: it uses as many samples as that allows
+    #[arg(long, value_name = "TIME", value_parser = parse_time, help_heading = EFFORT)]
     time_budget: Option<Duration>,
-    /// Stop at a part of the samples once the rmse over all is within this share of the best, 1% say, with 95 % confidence
-    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
+    /// Stop at a part of the samples once the rmse over all is within this share of the best (1%, say) with 95 % confidence
+    #[arg(long, value_name = "SHARE", value_parser = parse_share, allow_hyphen_values = true, help_heading = EFFORT)]
     target_rmse_excess: Option<f64>,
     /// Also find standard errors by redrawing the data N times
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000), help_heading = EFFORT)]
     bootstrap: Option<u32>,
     /// Seed of the redrawing
-    #[arg(long, default_value_t = 0, value_name = "SEED")]
+    #[arg(long, default_value_t = 0, requires = "bootstrap", value_name = "SEED", help_heading = EFFORT)]
     seed: u64,
     /// Where to write the fit of one measurement; `-` is stdout
-    #[arg(long, value_name = "FIT.json", conflicts_with = "out_dir")]
+    #[arg(long, value_name = "FIT.json", conflicts_with = "out_dir", help_heading = OUTPUT)]
     out: Option<PathBuf>,
     /// Folder to write the fits of several measurements to, each under its own name
-    #[arg(long, value_name = "D")]
+    #[arg(long, value_name = "D", help_heading = OUTPUT)]
     out_dir: Option<PathBuf>,
     /// Print every step of the search on stderr
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     log: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Reading")]
     reading: Reading,
 }
 
@@ -109,11 +115,16 @@ fn parse_weights(text: &str) -> Result<WeightMode, String> {
         .ok_or_else(|| "known are solid-angle, uniform".into())
 }
 
+/// `50ms` or `2s`.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    humantime::parse_duration(text).map_err(|_| "expected a time, 50ms or 2s say".into())
+}
+
 /// `1%` or `0.01`.
 fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
-    let share: f64 = number.trim().parse().map_err(|_| format!("\"{text}\" is no share: expected 1% or 0.01, say"))?;
-    if share > 0.0 && share.is_finite() { Ok(share * unit) } else { Err("the share must be positive".into()) }
+    let share: Option<f64> = number.trim().parse().ok().filter(|share: &f64| *share > 0.0 && share.is_finite());
+    share.map(|share| share * unit).ok_or_else(|| "expected a positive share, 1% or 0.01 say".into())
 }
 
 impl Args {
@@ -272,8 +283,8 @@ fn log(fitted: &Fitted, ui: &Ui) {
     ui.note(&format!("  stopped: {:?}", fitted.stop));
 }
 
-/// A fit in words: every parameter with its standard error.
-pub(super) fn describe(name: &str, material: &Material) -> String {
+/// A fit in words: every parameter with its standard error, then what else the record says.
+fn describe(name: &str, material: &Material) -> String {
     let mut t = String::new();
     let default = FitRecord::default();
     let record = material.fit.as_ref().unwrap_or(&default);
@@ -288,68 +299,112 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
     );
     for (l, lobe) in material.lobes.iter().enumerate() {
         let name = material.lobe_name(l);
+        let (errors, intervals) = (record.standard_error.get(l), record.interval_95.get(l));
         for (c, weight) in lobe.weight.iter().enumerate() {
-            let error = record.standard_error.get(l).and_then(|r| r.weight.get(c).copied().flatten());
-            let label = format!("{name}.weight[{}]", material.channels[c]);
-            let _ = writeln!(t, "  {label:22} {}", plus_minus(*weight, error));
+            let error = errors.and_then(|r| r.weight.get(c).copied().flatten());
+            let interval = intervals.and_then(|r| r.weight.get(c).copied().flatten());
+            parameter(&mut t, &format!("{name}.weight[{}]", material.channels[c]), *weight, error, interval);
         }
         let Some(shape) = &lobe.shape else {
             let _ = writeln!(t, "  {:22} undetermined: the lobe has no weight", format!("{name}.*"));
             continue;
         };
-        for (i, parameter) in lobe.kind.lobe().parameters().iter().enumerate() {
-            let error = record.standard_error.get(l).and_then(|r| r.shape.get(i)).map(|(_, e)| e);
-            let label = format!("{name}.{}", parameter.name);
+        for (i, known) in lobe.kind.lobe().parameters().iter().enumerate() {
+            let errors = errors.and_then(|r| r.shape.get(i)).map(|(_, e)| e);
+            let intervals = intervals.and_then(|r| r.shape.get(i)).map(|(_, e)| e);
+            let at = |c: usize| (errors.and_then(|e| e.get(c)).flatten(), intervals.and_then(|e| e.get(c)).flatten());
+            let label = format!("{name}.{}", known.name);
             match &shape[i] {
-                PerChannel::Shared(value) => {
-                    let error = error.and_then(|e| e.get(0)).flatten();
-                    let _ = writeln!(t, "  {label:22} {}", plus_minus(*value, error));
-                }
+                PerChannel::Shared(value) => parameter(&mut t, &label, *value, at(0).0, at(0).1),
                 PerChannel::Each(values) => {
                     for (c, value) in values.iter().enumerate() {
-                        let error = error.and_then(|e| e.get(c)).flatten();
                         let label = format!("{label}[{}]", material.channels[c]);
-                        let _ = writeln!(t, "  {label:22} {}", plus_minus(*value, error));
+                        parameter(&mut t, &label, *value, at(c).0, at(c).1);
                     }
                 }
             }
         }
     }
-    t.push_str(&evidence(record));
+    t.push_str(&evidence(record, &material.channels));
     for warning in &record.warnings {
-        let _ = writeln!(t, "  warning: {warning}");
+        t.push_str(&hanging(&format!("warning: {warning}")));
     }
     t
 }
 
+/// One line a parameter; its interval only where the error does not tell it: where it is lopsided.
+fn parameter(t: &mut String, label: &str, value: f64, error: Option<f64>, interval: Option<(f64, f64)>) {
+    let _ = write!(t, "  {label:22} {}", plus_minus(value, error));
+    if let Some((low, high)) = interval {
+        let (below, above) = (value - low, high - value);
+        if below.max(above) > LOPSIDED * below.min(above) {
+            let _ = write!(t, "  (95 %: {} to {})", digits(low), digits(high));
+        }
+    }
+    t.push('\n');
+}
+
+/// Halves of an interval that differ by more than this factor are shown.
+const LOPSIDED: f64 = 1.2;
+
+/// Three digits.
+fn digits(x: f64) -> String {
+    if x == 0.0 || !(1e-4..1e6).contains(&x.abs()) {
+        return if x == 0.0 { "0".into() } else { format!("{x:.2e}") };
+    }
+    let places = (2.0 - x.abs().log10().floor()).max(0.0) as usize;
+    format!("{x:.places$}")
+}
+
 /// What else the numbers say: the noise and the model's own error, how the minimum was found, how the model was chosen.
-fn evidence(record: &FitRecord) -> String {
+fn evidence(record: &FitRecord, channels: &[String]) -> String {
     let mut t = String::new();
+    let mut say = |text: String| t.push_str(&hanging(&text));
+    if let (Some(robust), [first, ..]) = (&record.robust, &record.robust_scale[..]) {
+        let others = if record.robust_scale.len() > 1 { " (the first channel's)" } else { "" };
+        say(format!("robust {robust}: residuals beyond {first:.3e}{others} count less"));
+    }
+    if !record.relative_epsilon.is_empty() {
+        let each = channels.iter().zip(&record.relative_epsilon).map(|(c, e)| format!("{c} {e:.3e}"));
+        say(format!("ε of the relative loss: {}", each.collect::<Vec<_>>().join(", ")));
+    }
     if let Some(r) = &record.residual {
         let from = if r.noise_from == "sigma" { "as the file states" } else { "from neighbours" };
-        let _ = writeln!(
-            t,
-            "  residuals: noise {:.2e} ({from}), model error {:.2e}; worth {:.0} independent samples",
-            r.noise_rmse, r.model_rmse, r.effective_samples
-        );
+        let model =
+            if r.model_rmse > 0.0 { format!("model error {:.2e}", r.model_rmse) } else { "no model error seen".into() };
+        say(format!(
+            "residuals: noise {:.2e} ({from}), {model}; worth {:.0} samples",
+            r.noise_rmse, r.effective_samples
+        ));
     }
-    if let Some(s) = record.search.as_ref().filter(|s| s.starts > 1) {
-        let others = match s.runner_up_excess {
-            Some(excess) => format!("; the next minimum costs {:.2} % more", 100.0 * excess),
-            None => String::new(),
+    if let Some(e) = &record.energy {
+        say(format!("energy: reflects {:.1} % of the light at most", 100.0 * e.largest));
+    }
+    // A single shape is bracketed over its whole range: nothing to add unless another minimum is nearly as low.
+    if let Some(s) =
+        record.search.as_ref().filter(|s| s.unseen_chance.is_some() || s.runner_up_excess.is_some_and(|e| e < RIVAL))
+    {
+        let more = |e: f64| {
+            if e < 1.0 { format!("{} more", percent(e)) } else { format!("{} times as much", digits(1.0 + e)) }
         };
-        let unseen =
-            s.unseen_chance.map_or(String::new(), |p| format!("; chance of one not seen {:.1} % a start", 100.0 * p));
-        let _ = writeln!(t, "  search: {} of {} starts end in the lowest minimum{others}{unseen}", s.reached, s.starts);
+        let others = s.runner_up_excess.map_or(String::new(), |e| format!("; the next costs {}", more(e)));
+        let unseen = s
+            .unseen_chance
+            .map_or(String::new(), |p| format!("; another start finds a new one by a chance of {}", percent(p)));
+        if s.starts > 1 {
+            say(format!("search: {} of {} starts end in the lowest minimum{others}{unseen}", s.reached, s.starts));
+        }
     }
     if let Some(s) = &record.subset {
-        let _ = writeln!(
-            t,
-            "  {} of about {} directions used: rmse over all within {:.2} % of the best (95 %)",
+        say(format!(
+            "{} of about {} directions used: rmse over all within {} of the best (95 % confidence)",
             s.samples,
             s.of,
-            100.0 * s.rmse_excess_95
-        );
+            percent(s.rmse_excess_95)
+        ));
+    }
+    if let Some(text) = redrawn(record) {
+        say(text);
     }
     if let Some(choice) = &record.choice {
         t.push_str(&comparison(choice));
@@ -357,19 +412,67 @@ fn evidence(record: &FitRecord) -> String {
     t
 }
 
+/// Another minimum whose cost exceeds the lowest by less than this share is worth a word.
+const RIVAL: f64 = 0.1;
+
+fn percent(share: f64) -> String {
+    format!("{} %", digits(100.0 * share))
+}
+
+/// How the bootstrap's standard errors compare with the analytic ones.
+fn redrawn(record: &FitRecord) -> Option<String> {
+    let bootstrap = record.bootstrap.as_ref()?;
+    let mut ratios = Vec::new();
+    for (drawn, known) in bootstrap.standard_error.iter().zip(&record.standard_error) {
+        let mut compare = |pair: (Option<f64>, Option<f64>)| {
+            ratios.extend(pair.0.zip(pair.1).filter(|p| p.1 > 0.0).map(|(drawn, known)| drawn / known));
+        };
+        drawn.weight.iter().copied().zip(known.weight.iter().copied()).for_each(&mut compare);
+        for ((_, drawn), (_, known)) in drawn.shape.iter().zip(&known.shape) {
+            let list = |p: &PerChannel<Option<f64>>| match p {
+                PerChannel::Shared(one) => vec![*one],
+                PerChannel::Each(many) => many.clone(),
+            };
+            list(drawn).into_iter().zip(list(known)).for_each(&mut compare);
+        }
+    }
+    let (least, most) = ratios.iter().fold((f64::INFINITY, 0.0f64), |(a, b), r| (a.min(*r), b.max(*r)));
+    (!ratios.is_empty()).then(|| {
+        let count = bootstrap.replicates;
+        format!("bootstrap: standard errors over {count} drawings are {least:.2} to {most:.2} of those above")
+    })
+}
+
 /// The models compared, as a table.
 fn comparison(choice: &ModelChoice) -> String {
-    let mut t = String::from("  model                      parameters  rmse       held out   AICc       BIC\n");
+    let mut t = String::from("  model                      par.       rmse   held out       AICc        BIC\n");
     for c in &choice.candidates {
         let mark = if c.model == choice.chosen { "*" } else { " " };
         let _ = writeln!(
             t,
-            "{mark} {:28} {:8}  {:.3e}  {:.3e}  {:9.1}  {:9.1}",
+            "{mark} {:26} {:4} {:10.3e} {:10.3e} {:10.1} {:10.1}",
             c.model, c.parameters, c.rmse, c.held_out_rmse, c.aicc, c.bic
         );
     }
-    let _ = writeln!(t, "  chosen: {}: {}", choice.chosen, choice.reason);
-    t
+    t + &hanging(&format!("chosen: {}: {}", choice.chosen, choice.reason))
+}
+
+/// Columns that prose is wrapped at.
+const COLUMNS: usize = 90;
+
+/// A paragraph indented by two, what follows its first line by four.
+fn hanging(text: &str) -> String {
+    let mut lines = vec![String::from(" ")];
+    for word in text.split(' ') {
+        let last = lines.len() - 1;
+        if lines[last].chars().count() + 1 + word.chars().count() > COLUMNS && lines[last].trim() != "" {
+            lines.push(format!("    {word}"));
+        } else {
+            lines[last].push(' ');
+            lines[last].push_str(word);
+        }
+    }
+    lines.join("\n") + "\n"
 }
 
 /// `0.3201 ± 0.0004`: the error to two digits, the value to the same place; powers of ten where that would be long.
@@ -379,6 +482,9 @@ pub(super) fn plus_minus(value: f64, error: Option<f64>) -> String {
         return format!("{value}");
     }
     let places = 1.0 - error.log10().floor();
+    if (-4.0..0.0).contains(&places) {
+        return format!("{value:.0} ± {error:.0}");
+    }
     if (0.0..=9.0).contains(&places) {
         let places = places as usize;
         return format!("{value:.places$} ± {error:.places$}");
@@ -391,9 +497,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn paragraphs_hang_and_keep_every_word() {
+        let text = "warning: ".to_owned() + &"word ".repeat(60);
+        let shown = hanging(text.trim());
+        assert!(shown.lines().count() > 3 && shown.lines().all(|l| l.chars().count() <= COLUMNS), "{shown}");
+        assert!(
+            shown.starts_with("  warning: word") && shown.lines().skip(1).all(|l| l.starts_with("    word")),
+            "{shown}"
+        );
+        assert_eq!(shown.split_whitespace().count(), text.split_whitespace().count());
+        assert_eq!(hanging("short"), "  short\n");
+    }
+
+    #[test]
+    fn three_digits_whatever_the_size() {
+        let shown = [0.0, 0.012_34, 1.0, 89.96, 12_345.6, 1e8, 2e-9].map(digits);
+        assert_eq!(shown, ["0", "0.0123", "1.00", "90.0", "12346", "1.00e8", "2.00e-9"]);
+    }
+
+    #[test]
     fn errors_are_shown_to_two_digits() {
         assert_eq!(plus_minus(0.320_123, Some(0.000_41)), "0.32012 ± 0.00041");
         assert_eq!(plus_minus(312.49, Some(12.3)), "312 ± 12");
+        assert_eq!(plus_minus(79.53, Some(134.2)), "80 ± 134");
         assert_eq!(plus_minus(0.314, Some(7e29)), "0.314000000 ± 7.0e29");
         assert_eq!(plus_minus(0.3, Some(1e-15)), "0.300000000 ± 1.0e-15");
         assert_eq!(plus_minus(0.5, Some(0.0)), "0.5");

@@ -5,11 +5,9 @@ use rand_distr::{Distribution, Poisson};
 
 use super::limits::Ranges;
 use super::options::{Bootstrap, FitError, FitOptions};
-use super::part::Part;
-use super::passes;
-use super::reduced::{Problem, Search, Solution, Streamed};
+use super::part::{self, Part};
+use super::reduced::Solution;
 use super::samples::Samples;
-use super::solver::{self, LevenbergMarquardt};
 use crate::brdf::ModelSpec;
 use crate::numeric::random::{Purpose, stream};
 
@@ -32,22 +30,7 @@ pub(super) fn bootstrap(
         let mut rng = stream(draws.seed, Purpose::Bootstrap, u64::from(replicate));
         let factor: Vec<f64> = (0..all.len()).map(|_| poisson.sample(&mut rng)).collect();
         let redrawn = all.reweighted(&factor);
-        let mut problem = Problem::new(&redrawn, model, ranges, options.conserve_energy);
-        problem.saturation = part.saturation;
-        let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
-        let start = DVector::from_column_slice(&part.solution.t);
-        let solution = if problem.is_transformable() {
-            let (transform, energy) = passes::transform(&redrawn);
-            let search = Search::new(&problem, &transform, &energy);
-            let found =
-                solver::minimize(&search, lm, start, options.max_iterations).map_err(|e| failed(e.to_string()))?;
-            search.solve(found.t.as_slice())
-        } else {
-            let streamed = Streamed::from(&problem, part.solution.clone());
-            let found =
-                solver::minimize(&streamed, lm, start, options.max_iterations).map_err(|e| failed(e.to_string()))?;
-            streamed.solve(found.t.as_slice())
-        };
+        let solution = part::refit(&redrawn, part, model, ranges, options)?;
         let moved = flat(&solution) - &centre;
         squares += moved.component_mul(&moved);
         sum += moved;

@@ -1,9 +1,10 @@
 //! Which model? Candidates compared by the error on directions that they were not fitted to.
 
-use super::limits::Ranges;
+use super::limits::{Limit, Ranges};
 use super::options::{FitError, FitOptions};
 use super::part;
-use super::passes::{self, Want};
+use super::passes::{self, Saturation, Want};
+use super::reduced::Solution;
 use super::samples::{Samples, Thin};
 use super::{Fitted, fit};
 use crate::brdf::{ModelCandidate, ModelChoice, ModelSpec};
@@ -29,19 +30,23 @@ const AS_GOOD: f64 = 0.01;
 pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
     options.validate(measurement)?;
     let mut candidates = Vec::new();
-    let mut effective = measurement.len() as f64;
-    for name in CANDIDATES {
+    let mut effective = None;
+    // The richest first: its residuals set the robust scale by which all are judged.
+    let mut common = None;
+    for name in CANDIDATES.into_iter().rev() {
         let spec: ModelSpec = name.parse().map_err(|_| FitError::Solver { reason: format!("no model {name}") })?;
-        let own = FitOptions { model: spec, bootstrap: None, time_budget: None, ..options.clone() };
-        let (candidate, samples) = candidate(measurement, &own)?;
-        // Residuals are the less alike the better the model: the last one's tell best how many there are.
-        effective = samples.unwrap_or(effective);
-        candidates.push(candidate);
+        // A limit of a lobe that a candidate lacks does not concern it.
+        let limits = options.limits.iter().filter(|l| concerns(l, &spec, measurement)).cloned().collect();
+        let own = FitOptions { model: spec, limits, bootstrap: None, time_budget: None, ..options.clone() };
+        let tried = candidate(measurement, &own, &mut common)?;
+        // Residuals are the less alike the better the model: the richest one's tell best how many there are.
+        effective = effective.or(tried.effective);
+        candidates.insert(0, tried);
     }
-    for candidate in &mut candidates {
-        candidate.judge(effective);
+    for tried in &mut candidates {
+        tried.candidate.judge(effective.unwrap_or(measurement.len() as f64));
     }
-    let choice = choose(candidates);
+    let choice = choose(&candidates);
     let model = choice.chosen.parse().map_err(|_| FitError::Solver { reason: "no model was chosen".into() })?;
     let mut fitted = fit(measurement, &FitOptions { model, ..options.clone() })?;
     if let Some(record) = &mut fitted.material.fit {
@@ -50,9 +55,13 @@ pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result
     Ok(fitted)
 }
 
-/// One model's errors on the samples it was fitted to and on those it was not; with it, how many independent samples its residuals are
-/// worth.
-fn candidate(measurement: &Measurement, options: &FitOptions) -> Result<(ModelCandidate, Option<f64>), FitError> {
+/// One model's errors on the samples it was fitted to and on those it was not.
+/// Residuals count as they do in `common`, which the first candidate sets.
+fn candidate(
+    measurement: &Measurement,
+    options: &FitOptions,
+    common: &mut Option<Vec<Saturation>>,
+) -> Result<Tried, FitError> {
     let model = options.model_for(measurement)?;
     let ranges = Ranges::new(&model, &measurement.channels, &options.limits)?;
     let all: Vec<usize> = (0..measurement.channels.len()).collect();
@@ -62,12 +71,19 @@ fn candidate(measurement: &Measurement, options: &FitOptions) -> Result<(ModelCa
     let thin = Thin { step: measurement.len().div_ceil(SAMPLES), run };
     let (mut cost, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
     let mut effective = Some(0.0);
-    for group in groups {
+    let mut own = Vec::new();
+    for (k, group) in groups.into_iter().enumerate() {
         let (samples, _) = Samples::gather(measurement, &model, options, group, thin)?;
         let samples = samples.listed(|_| true);
         let unit = options.loss.cost_unit(samples.scale);
         let whole = part::fit(&samples, None, &model, &ranges, options)?;
-        cost += whole.solution.cost * unit;
+        own.push(whole.saturation);
+        let saturation = common.as_ref().map_or(whole.saturation, |list| list[k]);
+        let cost_on = |at: &Solution, on: &Samples<'_>| -> f64 {
+            let sums = passes::sums(on, &at.lobes, &at.weights, saturation, Want::Gradient);
+            sums.iter().map(|s| s.cost).sum::<f64>() * unit
+        };
+        cost += cost_on(&whole.solution, &samples);
         residuals += samples.residuals();
         parameters += whole.uncertainty.errors.len();
         effective = effective.zip(whole.structure).map(|(sum, s)| sum + s.effective_samples);
@@ -78,13 +94,12 @@ fn candidate(measurement: &Measurement, options: &FitOptions) -> Result<(ModelCa
             if train.len() == 0 || test.len() == 0 {
                 continue;
             }
-            let found = part::fit(&train, None, &model, &ranges, options)?;
-            let sums =
-                passes::sums(&test, &found.solution.lobes, &found.solution.weights, found.saturation, Want::Gradient);
-            held_out.0 += sums.iter().map(|s| s.cost).sum::<f64>() * unit;
+            let found = part::refit(&train, &whole, &model, &ranges, options)?;
+            held_out.0 += cost_on(&found, &test);
             held_out.1 += test.residuals();
         }
     }
+    common.get_or_insert(own);
     let rms = |(cost, n): (f64, usize)| (cost / n.max(1) as f64).sqrt();
     let candidate = ModelCandidate {
         model: options.model.to_string(),
@@ -94,7 +109,21 @@ fn candidate(measurement: &Measurement, options: &FitOptions) -> Result<(ModelCa
         aicc: f64::NAN,
         bic: f64::NAN,
     };
-    Ok((candidate, effective))
+    Ok(Tried { candidate, effective, folds: held_out.into_iter().map(rms).collect() })
+}
+
+/// A model's errors.
+struct Tried {
+    candidate: ModelCandidate,
+    /// How many independent samples its residuals are worth.
+    effective: Option<f64>,
+    /// Held-out rmse of every fold.
+    folds: Vec<f64>,
+}
+
+/// Whether a model has the parameter that a limit is about.
+fn concerns(limit: &Limit, model: &ModelSpec, measurement: &Measurement) -> bool {
+    Ranges::new(model, &measurement.channels, std::slice::from_ref(limit)).is_ok()
 }
 
 /// The fold of every sample, by its cell of (θi, θo).
@@ -113,28 +142,48 @@ impl ModelCandidate {
     }
 }
 
+/// By how much a model's held-out error exceeds the best's, as a share, and the standard error of that over the folds.
+fn excess(own: &Tried, best: &Tried) -> (f64, f64) {
+    let least = best.candidate.held_out_rmse;
+    let pairs = own.folds.iter().zip(&best.folds).filter(|(a, b)| **a > 0.0 || **b > 0.0);
+    let differences: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    (own.candidate.held_out_rmse / least - 1.0, (variance / n).sqrt() / least)
+}
+
 /// The simplest candidate that is as good as the best, and why.
-fn choose(candidates: Vec<ModelCandidate>) -> ModelChoice {
-    let error = |c: &ModelCandidate| if c.held_out_rmse.is_finite() { c.held_out_rmse } else { f64::INFINITY };
-    let least = candidates.iter().map(error).fold(f64::INFINITY, f64::min);
-    let good = |c: &&ModelCandidate| error(c) <= least * (1.0 + AS_GOOD);
-    let chosen = candidates.iter().filter(good).min_by_key(|c| c.parameters).or(candidates.first());
-    let (name, own) = chosen.map_or((String::new(), f64::NAN), |c| (c.model.clone(), error(c)));
-    let best = candidates.iter().min_by(|a, b| error(a).total_cmp(&error(b))).map_or("", |c| &c.model);
-    let reason = if best == name {
-        let simpler = candidates.iter().filter(|c| chosen.is_some_and(|own| c.parameters < own.parameters));
-        match simpler.map(error).min_by(f64::total_cmp) {
-            Some(next) => {
-                format!("lowest held-out error; the best simpler model's is {:.1} % higher", 100.0 * (next / own - 1.0))
-            }
-            None => "lowest held-out error, and no model is simpler".to_owned(),
-        }
+fn choose(tried: &[Tried]) -> ModelChoice {
+    let error = |t: &&Tried| {
+        let e = t.candidate.held_out_rmse;
+        if e.is_finite() { e } else { f64::INFINITY }
+    };
+    let candidates: Vec<ModelCandidate> = tried.iter().map(|t| t.candidate.clone()).collect();
+    let Some(best) = tried.iter().min_by(|a, b| error(a).total_cmp(&error(b))) else {
+        return ModelChoice { chosen: String::new(), reason: String::new(), candidates };
+    };
+    let good = |t: &&Tried| {
+        let (excess, error) = excess(t, best);
+        excess <= AS_GOOD.max(error)
+    };
+    let chosen = tried.iter().filter(good).min_by_key(|t| t.candidate.parameters).unwrap_or(best);
+    let simpler = tried.iter().filter(|t| t.candidate.parameters < chosen.candidate.parameters);
+    let next = simpler.map(|t| error(&t)).min_by(f64::total_cmp);
+    let own = error(&chosen);
+    let mut reason = if chosen.candidate.model == best.candidate.model {
+        "the lowest held-out error".to_owned()
     } else {
-        let gain = 100.0 * (own / least - 1.0);
+        let (excess, error) = excess(chosen, best);
         format!(
-            "the simplest model within {:.0} % of the lowest held-out error ({best}, {gain:.2} % lower)",
-            100.0 * AS_GOOD
+            "the simplest model as good as the best one held out, {}, whose error is {:.2} % lower (within {:.2} % counts as good)",
+            best.candidate.model,
+            100.0 * excess / (1.0 + excess),
+            100.0 * AS_GOOD.max(error)
         )
     };
-    ModelChoice { chosen: name, reason, candidates }
+    if let Some(next) = next {
+        reason += &format!("; the best simpler model's is {:.1} % higher", 100.0 * (next / own - 1.0));
+    }
+    ModelChoice { chosen: chosen.candidate.model.clone(), reason, candidates }
 }

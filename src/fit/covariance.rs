@@ -82,7 +82,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let (channels, lobes, shapes) = (at.weights.len(), problem.kinds.len(), problem.layout.len());
     let n = samples.residuals();
     let parameters = channels * lobes + shapes;
-    let freedom = n as f64 - parameters as f64;
+    let pinned = pinned(problem, channels);
+    let freedom = n as f64 - pinned.iter().filter(|p| !**p).count() as f64;
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
     let start = || Part::new(problem, at);
     let add = |part: &mut Part, block: &Block| part.add(problem, at, block, moments.is_none());
@@ -128,9 +129,10 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
             }
         }
     }
-    let sandwich = Sandwich::new(&normal);
+    let sandwich = Sandwich::new(&normal, &pinned);
     let covariance = sandwich.covariance(&spread, &common);
-    let errors = sandwich.errors(&covariance);
+    let mut errors = sandwich.errors(&covariance);
+    errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
     let grouped = sandwich.covariance(&(clusters * (count as f64 / (count as f64 - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&drawn, &[]);
     let design_effect = (&normal * &grouped).trace() / (&normal * &drawn).trace();
@@ -162,6 +164,12 @@ fn place(problem: &Problem<'_>, channels: usize, channel: usize) -> Vec<usize> {
     (channel * lobes..(channel + 1) * lobes).chain(shapes).collect()
 }
 
+/// Which parameters are held at a value.
+fn pinned(problem: &Problem<'_>, channels: usize) -> Vec<bool> {
+    let ranges = problem.ranges[..channels].iter().flatten().chain(&problem.bounds);
+    ranges.map(|(low, high)| low == high).collect()
+}
+
 /// A⁻¹ where it exists.
 struct Sandwich {
     bread: DMatrix<f64>,
@@ -170,8 +178,10 @@ struct Sandwich {
 }
 
 impl Sandwich {
-    fn new(normal: &DMatrix<f64>) -> Self {
-        let scale = normal.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    /// Of the parameters that are not pinned.
+    fn new(normal: &DMatrix<f64>, pinned: &[bool]) -> Self {
+        let root = |i: usize| if normal[(i, i)] > 0.0 && !pinned[i] { 1.0 / normal[(i, i)].sqrt() } else { 0.0 };
+        let scale = DVector::from_fn(pinned.len(), |i, _| root(i));
         let n = scale.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
         let eigen = scaled.symmetric_eigen();

@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use super::covariance::Uncertainty;
 use super::reduced::{Problem, Search, Solution, Streamed};
 use super::solver::{self, LevenbergMarquardt, SolverOptions};
+use crate::numeric::stats::chi_square_quantile;
 
 /// Cost that a difference of sums does not resolve, as a share of the data's energy.
 const RESOLVED: f64 = 1e-13;
@@ -50,7 +51,8 @@ fn mark(
 ) {
     let (channels, lobes) = (at.weights.len(), problem.kinds.len());
     let freedom = problem.samples.residuals() as f64 - uncertainty.errors.len() as f64;
-    let rise = uncertainty.quantile.powi(2) * least / freedom.max(1.0) + resolved;
+    // A lobe brings a weight a channel and a shape; the factor is for noise that is not the same everywhere.
+    let rise = 1.5 * chi_square_quantile(0.95, channels as f64 + 1.0) * least / freedom.max(1.0) + resolved;
     let as_good = |i: usize, end: f64| {
         let mut held = problem.on(problem.samples);
         held.bounds[i] = (end, end);

@@ -24,9 +24,7 @@ pub(super) fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertai
     let around = |(i, error): (usize, &Option<f64>)| {
         let error = (*error)?;
         let (value, (low, high)) = parameter(problem, at, i);
-        let whole =
-            if i < at.weights.len() * problem.kinds.len() { (low, high) } else { (f64::NEG_INFINITY, f64::INFINITY) };
-        Some(((value - q * error).max(whole.0), (value + q * error).min(whole.1)))
+        Some(((value - q * error).max(low), (value + q * error).min(high)))
     };
     uncertainty.errors.iter().enumerate().map(around).collect()
 }

@@ -73,6 +73,8 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     }
     let samples = if let [part] = &parts[..] {
         part.samples
+    } else if parts.iter().any(|p| p.subset.is_some()) {
+        parts.iter().map(|p| p.samples).max().unwrap_or(0)
     } else {
         Samples::gather(measurement, &model, options, &all, Thin::NONE)?.0.len()
     };

@@ -54,6 +54,9 @@ const LOST_CONDITION: f64 = 1e8;
 /// Values of a table whose last digits are worth many passes.
 pub(super) const SMALL: usize = 200_000;
 
+/// An rmse below this, in the fit's scale, is rounding: nothing can be said of its structure.
+const ROUNDING: f64 = 1e-13;
+
 /// Fits the samples.
 pub(super) fn fit(
     samples: &Samples<'_>,
@@ -70,6 +73,30 @@ pub(super) fn fit(
         return by_search(&search, options);
     }
     by_passes(&problem, options)
+}
+
+/// The same model on other samples, from shapes known to be near, as `like` has them: its solution alone.
+pub(super) fn refit(
+    samples: &Samples<'_>,
+    like: &Part,
+    model: &ModelSpec,
+    ranges: &Ranges,
+    options: &FitOptions,
+) -> Result<Solution, FitError> {
+    let mut problem = Problem::new(samples, model, ranges, options.conserve_energy);
+    problem.saturation = like.saturation;
+    let start = DVector::from_column_slice(&like.solution.t);
+    let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
+    let failed = |e: argmin::core::Error| FitError::Solver { reason: e.to_string() };
+    if problem.is_transformable() {
+        let (transform, energy) = passes::transform(samples);
+        let search = Search::new(&problem, &transform, &energy);
+        let found = solver::minimize(&search, lm, start, options.max_iterations).map_err(failed)?;
+        return Ok(search.solve(found.t.as_slice()));
+    }
+    let streamed = Streamed::from(&problem, like.solution.clone());
+    let found = solver::minimize(&streamed, lm, start, options.max_iterations).map_err(failed)?;
+    Ok(streamed.solve(found.t.as_slice()))
 }
 
 /// A loss that is linear in the weights, without outliers: everything from the transforms, last digits from true residuals.
@@ -194,8 +221,10 @@ fn finish(
             rmse,
             stated,
             &uncertainty.neighbours,
+            residuals,
             residuals as f64 / uncertainty.design_effect,
-        ),
+        )
+        .filter(|_| rmse > ROUNDING),
         saturation: problem.saturation,
         stop: found.outcome.stop,
         history: found.outcome.history,

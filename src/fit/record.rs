@@ -192,7 +192,8 @@ impl Facts<'_> {
         let dark = row.term.weight.iter().all(|w| *w == 0.0);
         let mut shape = Vec::new();
         for (own, parameter) in kind.lobe().parameters().iter().enumerate() {
-            let values: Vec<ShapeValue> = self.parts.iter().map(|p| p.shape_value(l, own)).collect();
+            let values: Vec<ShapeValue> =
+                self.parts.iter().map(|p| p.shape_value(l, own, &self.ranges.shapes)).collect();
             shape.push(shared(&values, |v| v.value));
             let name = || parameter.name.to_owned();
             row.error.shape.push((name(), shared(&values, |v| v.error)));
@@ -324,7 +325,7 @@ impl Part {
     }
 
     /// Parameter `own` of lobe `l`.
-    fn shape_value(&self, l: usize, own: usize) -> ShapeValue {
+    fn shape_value(&self, l: usize, own: usize, ranges: &[(f64, f64)]) -> ShapeValue {
         let of_lobe = self.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l).map(|(i, _)| i);
         let Some(i) = of_lobe.clone().nth(own) else {
             return ShapeValue { value: f64::NAN, error: None, interval: None, model_error: None, bootstrap: None };
@@ -333,7 +334,8 @@ impl Part {
         let place = self.solution.weights.len() * self.solution.lobes.len() + i;
         let (low, high) = self.bounds[i];
         if low == high {
-            let value = if value <= 2.0 * TINY_SHAPE { 0.0 } else { low.exp() };
+            // As it was asked for, not by way of its logarithm.
+            let value = if value <= 2.0 * TINY_SHAPE { 0.0 } else { ranges[i].0 };
             let nothing = Some(0.0);
             let interval = Some((value, value));
             return ShapeValue { value, error: nothing, interval, model_error: nothing, bootstrap: nothing };

@@ -18,8 +18,6 @@ const ROUNDS: usize = 60;
 const SETTLED: f64 = 1e-12;
 const SETTLED_LARGE: f64 = 1e-5;
 const SETTLED_PART: f64 = 1e-3;
-/// Relative change from which on the parameters are followed to their last digits.
-const FINE: f64 = 1e-4;
 /// Most that s shrinks in a round: the parameters must be able to follow.
 const SHRINK: f64 = 0.25;
 
@@ -67,6 +65,10 @@ fn follow(
         if excess.abs() <= settled {
             break;
         }
+        if bracket.1 - bracket.0 < 1e-3 * excess.abs() {
+            // The parameters jumped: what was known of the bracket no longer holds.
+            (bracket, last) = ((f64::NEG_INFINITY, f64::INFINITY), None);
+        }
         bracket = if excess > 0.0 { (bracket.0.max(here), bracket.1) } else { (bracket.0, bracket.1.min(here)) };
         let secant = last.map(|(x, e): (f64, f64)| here - excess * (here - x) / (excess - e)).filter(|x| x.is_finite());
         let mut next = secant.filter(|x| (x - here).abs() < 4.0 * excess.abs()).unwrap_or(wanted);
@@ -77,7 +79,7 @@ fn follow(
         last = Some((here, excess));
         s = next.max(here + SHRINK.ln()).exp();
         problem.saturation = Some((robust.kind, s));
-        let digits = if settled <= SETTLED && excess.abs() < FINE { Digits::All } else { Digits::Rough };
+        let digits = if settled <= SETTLED { Digits::All } else { Digits::Rough };
         at = descend(problem, at, steps, digits)?.0;
     }
     Ok(at)

@@ -473,7 +473,8 @@ impl<'a> Samples<'a> {
         solid_angle: bool,
         thin: Thin,
     ) -> Result<(), FitError> {
-        let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle, kind, thin };
+        let epsilon = self.plain_epsilon();
+        let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle, kind, thin, epsilon };
         let parts = sum::map_blocks(self.measurement.len(), |range| judge.list(range));
         let mut left = Left::default();
         let mut all = Block::default();
@@ -496,6 +497,19 @@ impl<'a> Samples<'a> {
         }
         self.source = Source::Listed(all);
         Ok(())
+    }
+
+    /// ε of the relative loss if every valid value counted for one; 0 for other losses.
+    fn plain_epsilon(&self) -> Vec<f64> {
+        if self.loss != Loss::Relative {
+            return vec![0.0; self.channels.len()];
+        }
+        let mean = |channel: &usize| {
+            let known = self.measurement.plane(*channel).iter().filter(|v| !v.is_nan());
+            let (sum, n) = known.fold((0.0, 0usize), |(sum, n), v| (sum + v.abs(), n + 1));
+            RELATIVE_EPSILON * if sum > 0.0 { sum / n as f64 } else { 1.0 }
+        };
+        self.channels.iter().map(mean).collect()
     }
 
     /// Looks at all samples once.
@@ -540,14 +554,9 @@ impl<'a> Samples<'a> {
     fn settle(&mut self, survey: &Survey, options: &FitOptions) -> Result<(), FitError> {
         if survey.directions == 0 {
             // Only a table comes here: the lists say themselves what is missing.
-            let judge = Judge {
-                samples: self,
-                options,
-                least_cos: least_cos(options),
-                solid_angle: false,
-                kind: None,
-                thin: Thin::NONE,
-            };
+            let (epsilon, thin) = (self.epsilon.clone(), Thin::NONE);
+            let least_cos = least_cos(options);
+            let judge = Judge { samples: self, options, least_cos, solid_angle: false, kind: None, thin, epsilon };
             let reasons = sum::map_blocks(self.measurement.len(), |range| judge.list(range).1);
             let mut left = Left::default();
             reasons.iter().for_each(|r| left.add(r));
@@ -563,7 +572,8 @@ impl<'a> Samples<'a> {
         if self.loss.is_homogeneous() && largest > 0.0 {
             self.scale = power_of_two(largest);
         }
-        let mean = |c: usize| if survey.weights[c] > 0.0 { survey.absolute[c] / survey.weights[c] } else { 0.0 };
+        // A channel that is 0 throughout may have any ε.
+        let mean = |c: usize| if survey.absolute[c] > 0.0 { survey.absolute[c] / survey.weights[c] } else { 1.0 };
         self.epsilon = (0..self.channels.len()).map(|c| RELATIVE_EPSILON * mean(c) / self.scale).collect();
         let factor = |c: usize| if survey.weights[c] > 0.0 { survey.counts[c] as f64 / survey.weights[c] } else { 0.0 };
         let factors: Vec<f64> = (0..self.channels.len()).map(factor).collect();
@@ -707,6 +717,8 @@ struct Judge<'a> {
     solid_angle: bool,
     kind: Option<LobeKind>,
     thin: Thin,
+    /// The relative loss's ε for the weights by σ, channel by channel: of all values, each counting for one.
+    epsilon: Vec<f64>,
 }
 
 /// Which entries of a measurement are looked at: of every `step` runs of `run` entries one, at a place that varies.
@@ -807,7 +819,7 @@ impl Judge<'_> {
         for (c, &channel) in samples.channels.iter().enumerate() {
             (w[c], y[c]) = (0.0, 0.0);
             let Some(value) = samples.measurement.value(channel, entry) else { continue };
-            let datum = Datum { value, cos_i, epsilon: 0.0 };
+            let datum = Datum { value, cos_i, epsilon: self.epsilon[c] };
             if !loss.accepts(datum) {
                 left.refused += 1;
                 continue;
@@ -819,11 +831,10 @@ impl Judge<'_> {
         any
     }
 
-    /// 1/σ_r² with σ_r = |∂r/∂y| σ at f = y; 0 where σ is no positive number. The relative loss's ε is not known yet: the value alone stands for its
-    /// denominator.
+    /// 1/σ_r² with σ_r = |∂r/∂y| σ at f = y; 0 where σ is no positive number.
     fn inverse_variance(&self, entry: usize, channel: usize, datum: Datum) -> f64 {
         let sigma = self.samples.measurement.sigma_plane(channel).map_or(f64::NAN, |s| s[entry]);
-        let sigma_r = sigma * self.samples.loss.data_slope(datum.value.max(0.0), datum);
+        let sigma_r = sigma * self.samples.loss.data_slope(datum.value, datum);
         if sigma > 0.0 && sigma_r > 0.0 && sigma_r.is_finite() { sigma_r.powi(-2) } else { 0.0 }
     }
 }

@@ -18,7 +18,7 @@ const STREAMED_BEAM: usize = 6;
 /// Lattice starts polished at most.
 const MOST_STARTS: usize = 8;
 /// Starts drawn at random on top, for models with several lobes.
-const RANDOM_STARTS: usize = 24;
+const RANDOM_STARTS: usize = 16;
 /// Costs that differ by less than this share belong to one minimum.
 const SAME: f64 = 1e-9;
 

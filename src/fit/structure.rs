@@ -10,6 +10,8 @@ pub(super) struct Neighbours {
     product: f64,
     /// Σ w (r² + r′²)/2.
     square: f64,
+    /// Σ (w r r′)²: the product's variance, were the residuals independent.
+    variance: f64,
     /// Pairs.
     count: usize,
 }
@@ -23,13 +25,14 @@ impl Neighbours {
     pub fn add(&mut self, other: &Self) {
         self.product += other.product;
         self.square += other.square;
+        self.variance += other.variance;
         self.count += other.count;
     }
 
     /// Correlation of neighbours' residuals, and its standard error were they independent; `None` for too few pairs.
     pub fn correlation(&self) -> Option<(f64, f64)> {
         let enough = self.count >= 30 && self.square > 0.0;
-        enough.then(|| (self.product / self.square, 1.0 / (self.count as f64).sqrt()))
+        enough.then(|| (self.product / self.square, self.variance.sqrt() / self.square))
     }
 }
 
@@ -58,8 +61,17 @@ impl Kernel for Sum<'_> {
             weight.iter_mut().zip(self.trust).for_each(|(p, t)| *p *= t);
         }
         let (weight, before, after) = (&weight[1..], &u[..n - 1], &u[1..]);
+        let mut product = vec![0.0; n - 1];
+        map(before, after, &mut product, |a, b| a * b);
+        let mut weighted = product.clone();
+        weighted.iter_mut().zip(weight).for_each(|(p, w)| *p *= w);
         let square = 0.5 * (dot3(weight, before, before) + dot3(weight, after, after));
-        Neighbours { product: dot3(weight, before, after), square, count: dot(self.pairs, self.pairs) as usize }
+        Neighbours {
+            product: dot(weight, &product),
+            square,
+            variance: dot(&weighted, &weighted),
+            count: dot(self.pairs, self.pairs) as usize,
+        }
     }
 }
 
@@ -78,18 +90,23 @@ pub(super) struct Structure {
     pub effective_samples: f64,
 }
 
-/// Splits an rmse. `stated` is the rmse that stated σ explain; `effective_samples` is passed on.
+/// Splits an rmse. `stated` is the rmse that stated σ explain; `samples` residuals are worth `effective_samples`.
 pub(super) fn structure(
     rmse: f64,
     stated: Option<f64>,
     neighbours: &Neighbours,
+    samples: usize,
     effective_samples: f64,
 ) -> Option<Structure> {
     let correlation = neighbours.correlation();
     // A correlation within its own noise is none.
     let real = correlation.map(|(rho, error)| if rho > 3.0 * error { rho.min(1.0) } else { 0.0 });
     let noise = match (stated, real) {
-        (Some(noise), _) => noise.min(rmse),
+        // An excess over the stated noise that its own scatter explains is none.
+        (Some(noise), _) if rmse * rmse <= noise * noise * (1.0 + 4.0 * (2.0 / samples.max(1) as f64).sqrt()) => {
+            return Some(Structure { noise, model: 0.0, from_sigma: true, share: 0.0, effective_samples });
+        }
+        (Some(noise), _) => noise,
         (None, Some(rho)) => rmse * (1.0 - rho).sqrt(),
         (None, None) => return None,
     };
@@ -113,13 +130,13 @@ mod tests {
         let (one, pairs) = (vec![1.0; n as usize], vec![1.0; n as usize]);
         let split = |r: &[f64]| {
             let rmse = (r.iter().map(|r| r * r).sum::<f64>() / f64::from(n)).sqrt();
-            structure(rmse, None, &Neighbours::of(r, &one, &one, &pairs), 7.0).expect("pairs")
+            structure(rmse, None, &Neighbours::of(r, &one, &one, &pairs), n as usize, 7.0).expect("pairs")
         };
         let (a, b, c) = (split(&noise), split(&slow), split(&both));
         assert_eq!((a.share, a.effective_samples), (0.0, 7.0));
         assert!(b.share > 0.999, "{b:?}");
         assert!((c.noise / (1.0f64 / 12.0).sqrt() - 1.0).abs() < 0.02, "{c:?}");
         assert!((c.model / 0.125f64.sqrt() - 1.0).abs() < 0.02, "{c:?}");
-        assert!(structure(1.0, None, &Neighbours::default(), 5.0).is_none());
+        assert!(structure(1.0, None, &Neighbours::default(), 5, 5.0).is_none());
     }
 }

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::bench::{Bench, csv, keys, number};
 
-/// The contract's keys in its order; `weights` says which of `--weights` was used.
+/// The keys of every fit, in their order; `weights` says which of `--weights` was used, or `sigma`.
 const RECORD: [&str; 12] = [
     "status",
     "loss",
@@ -19,6 +19,9 @@ const RECORD: [&str; 12] = [
     "undetermined",
     "warnings",
 ];
+
+/// Those that follow where they have something to say: of the plain fit of a measurement in space they have.
+const EVIDENCE: [&str; 4] = ["correlation", "residual", "energy", "search"];
 
 /// A lambertian with a dent where a mirror would send the light: no glossy lobe of positive weight helps.
 fn dented() -> String {
@@ -46,7 +49,7 @@ fn a_fit_has_exactly_the_keys_of_the_contract() {
     assert_eq!(fit["version"], 1);
     assert_eq!(fit["model"], "lambert+phong");
     assert_eq!(fit["channels"], json!(["r", "g", "b"]));
-    assert_eq!(keys(&fit["fit"]), RECORD);
+    assert_eq!(keys(&fit["fit"]), [&RECORD[..], &EVIDENCE[..]].concat());
     assert_eq!(fit["fit"]["status"], "converged");
     assert_eq!(fit["fit"]["loss"], "cosine-l2");
     assert_eq!(fit["fit"]["samples"], 2601);
@@ -83,6 +86,73 @@ fn lobes_errors_and_intervals_have_the_same_shape() {
     }
     let exponent = |v: &Value| v[1]["shape"]["exponent"].clone();
     holds(&exponent(&fit["lobes"]), &exponent(error), &exponent(interval));
+}
+
+#[test]
+fn what_the_residuals_the_search_and_the_energy_say_has_its_shape() {
+    let b = Bench::new();
+    b.fitted("p.csv", "p.json");
+    let fit = b.json_file("p.json");
+    let record = &fit["fit"];
+    assert_eq!(
+        keys(&record["residual"]),
+        ["noise_rmse", "model_rmse", "structured_share", "noise_from", "effective_samples"]
+    );
+    assert_eq!(record["residual"]["noise_from"], "sigma", "the simulated file states it");
+    assert_eq!(keys(&record["search"]), ["starts", "reached", "minima", "runner_up_excess", "unseen_chance"]);
+    assert_eq!(record["search"]["unseen_chance"], Value::Null, "one shape is bracketed, not sampled");
+    assert_eq!(keys(&record["energy"]), ["theta_deg", "albedo", "largest", "conserved", "constrained"]);
+    let energy = &record["energy"];
+    assert_eq!((&energy["conserved"], &energy["constrained"]), (&json!(true), &json!(false)));
+    for c in 0..3 {
+        // At normal incidence every lobe reflects its weight, and at no other angle more.
+        let sum = number(&fit["lobes"][0]["weight"][c]) + number(&fit["lobes"][1]["weight"][c]);
+        let albedo: Vec<f64> = energy["albedo"][c].as_array().expect("a list").iter().map(number).collect();
+        assert_eq!(albedo.len(), energy["theta_deg"].as_array().map_or(0, Vec::len));
+        assert!((albedo[0] / sum - 1.0).abs() < 1e-9, "{} vs {sum}", albedo[0]);
+        assert!(
+            albedo.iter().all(|a| *a <= albedo[0] * (1.0 + 1e-12) && *a <= number(&energy["largest"])),
+            "{albedo:?}"
+        );
+    }
+}
+
+#[test]
+fn correlations_are_symmetric_with_ones_and_name_every_parameter() {
+    let b = Bench::new();
+    b.fitted("p.csv", "p.json");
+    let correlation = &b.json_file("p.json")["fit"]["correlation"];
+    let names = json!([
+        "lambert.weight[r]",
+        "lambert.weight[g]",
+        "lambert.weight[b]",
+        "phong.weight[r]",
+        "phong.weight[g]",
+        "phong.weight[b]",
+        "phong.exponent"
+    ]);
+    assert_eq!(correlation["parameters"], names);
+    for i in 0..7 {
+        for j in 0..7 {
+            let (a, b) = (number(&correlation["matrix"][i][j]), number(&correlation["matrix"][j][i]));
+            assert!((a - b).abs() < 1e-9 && a.abs() <= 1.0 && (i != j || a == 1.0), "{i} {j}: {a} vs {b}");
+        }
+    }
+    // A sharper lobe is higher and so needs less weight, or more where its flanks tell: never independent of it.
+    assert!(number(&correlation["matrix"][3][6]).abs() > 0.1, "{correlation}");
+}
+
+#[test]
+fn a_model_that_can_not_bend_enough_says_how_far_that_moves_its_parameters() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    let record = &b.json(&["fit", "p.csv", "--model", "phong"])["fit"];
+    let share = number(&record["residual"]["structured_share"]);
+    assert!(share > 0.99, "no lambert lobe, so nearly all is structure, not {share}");
+    assert!(record["warnings"].to_string().contains("does not describe"), "{}", record["warnings"]);
+    let (model, noise) = (&record["model_error"][0], &record["standard_error"][0]);
+    let exponent = |r: &Value| number(&r["shape"]["exponent"]);
+    assert!(exponent(model) > 3.0 * exponent(noise), "{model} vs {noise}");
 }
 
 #[test]
