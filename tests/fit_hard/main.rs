@@ -1,0 +1,9 @@
+//! The hard cases of the fit: where other fits break, each with a test of its own.
+#![allow(clippy::expect_used, clippy::panic)] // these are tests
+
+mod degenerate;
+mod invariance;
+mod optimum;
+mod recovery;
+mod reference;
+mod support;
