@@ -142,7 +142,7 @@ pub struct ResidualRecord {
     pub structured_share: f64,
     /// Where the noise is known from: `sigma` (the measurement's own) or `neighbours` (how alike residuals of neighbours are).
     pub noise_from: String,
-    /// How many independent samples the residuals are worth.
+    /// How many independent samples the residuals are worth: by how much more the parameters scatter than if they were (design effect).
     pub effective_samples: f64,
 }
 

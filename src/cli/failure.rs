@@ -63,7 +63,7 @@ impl From<ImageError> for Failure {
 impl From<FitError> for Failure {
     fn from(error: FitError) -> Self {
         let message = error.to_string();
-        if matches!(error, FitError::Option { .. }) { Self::usage(message) } else { Self::work(message) }
+        if matches!(error, FitError::Option { .. } | FitError::Limit { .. } | FitError::Infeasible { .. }) { Self::usage(message) } else { Self::work(message) }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
@@ -9,30 +10,66 @@ use super::failure::Failure;
 use super::info::Reading;
 use super::output::{check_folder, write_text};
 use super::ui::{self, Ui};
-use crate::brdf::{FitRecord, Material, ModelSpec, PerChannel};
-use crate::fit::{FitOptions, Fitted, Loss, WeightMode, fit};
-use crate::measurement::formats;
+use crate::brdf::{FitRecord, Material, ModelChoice, ModelSpec, PerChannel, SpecError};
+use crate::fit::{Bootstrap, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
+use crate::measurement::{Measurement, formats};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit fit gold.binary --out gold.json
-  goniofit fit *.binary --model lambert+phong --out-dir fits/")]
+  goniofit fit *.binary --model lambert+phong --out-dir fits/
+  goniofit fit gold.binary --model auto                      compare models, take the simplest good one
+  goniofit fit lab.csv --use-sigma --robust cauchy           with the file's own sigma, outliers let go
+  goniofit fit gold.binary --fix phong.exponent=50 --bound lambert.weight=0..0.3")]
 pub(super) struct Args {
     /// Measurements; `-` is stdin
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Lobes joined by +
-    #[arg(long, default_value = "lambert+phong", value_name = "SPEC")]
-    model: ModelSpec,
+    /// Lobes joined by +, or `auto` to compare models and take the simplest good one
+    #[arg(long, default_value = "lambert+phong", value_name = "SPEC|auto")]
+    model: Wanted,
     /// What is minimised
-    #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2")]
+    #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2|log|cuberoot|relative")]
     loss: Loss,
+    /// Let outliers count less; SCALE multiplies the residuals' σ [defaults: huber 1.345, cauchy 2.385]
+    #[arg(long, value_name = "huber|cauchy[:SCALE]")]
+    robust: Option<Robust>,
     /// How samples count
     #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform")]
     weights: WeightMode,
+    /// Weigh by the σ that the file states, instead of the solid angle
+    #[arg(long)]
+    use_sigma: bool,
     /// Leave out samples with θi or θo above this, degrees
     #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true)]
     max_angle: f64,
+    /// Use every N-th entry only
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    stride: usize,
+    /// Let every channel have its own shapes
+    #[arg(long)]
+    per_channel: bool,
+    /// Hold a parameter at a value, phong.exponent=50 say (a second lobe of a kind: phong[1]); may be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = Limit::fixed)]
+    fix: Vec<Limit>,
+    /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated
+    #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range)]
+    bound: Vec<Limit>,
+    /// Fit under the constraint that no channel reflects more light than it receives
+    #[arg(long)]
+    conserve_energy: bool,
+    /// Time that the fit may take, 50ms or 2s say: it then uses as many samples as that allows
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    time_budget: Option<Duration>,
+    /// Stop at a part of the samples once the rmse over all is within this share of the best, 1% say, with 95 % confidence
+    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
+    target_rmse_excess: Option<f64>,
+    /// Also find standard errors by redrawing the data N times
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    bootstrap: Option<u32>,
+    /// Seed of the redrawing
+    #[arg(long, default_value_t = 0, value_name = "SEED")]
+    seed: u64,
     /// Where to write the fit of one measurement; `-` is stdout
     #[arg(long, value_name = "FIT.json", conflicts_with = "out_dir")]
     out: Option<PathBuf>,
@@ -46,6 +83,21 @@ pub(super) struct Args {
     reading: Reading,
 }
 
+/// A model, or the wish that one be chosen.
+#[derive(Debug, Clone)]
+enum Wanted {
+    Auto,
+    Model(ModelSpec),
+}
+
+impl std::str::FromStr for Wanted {
+    type Err = SpecError;
+
+    fn from_str(text: &str) -> Result<Self, SpecError> {
+        if text == "auto" { Ok(Self::Auto) } else { text.parse().map(Self::Model) }
+    }
+}
+
 fn parse_loss(text: &str) -> Result<Loss, String> {
     Loss::from_name(text).ok_or_else(|| format!("known are {}", Loss::ALL.map(Loss::name).join(", ")))
 }
@@ -57,6 +109,37 @@ fn parse_weights(text: &str) -> Result<WeightMode, String> {
         .ok_or_else(|| "known are solid-angle, uniform".into())
 }
 
+/// `1%` or `0.01`.
+fn parse_share(text: &str) -> Result<f64, String> {
+    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
+    let share: f64 = number.trim().parse().map_err(|_| format!("\"{text}\" is no share: expected 1% or 0.01, say"))?;
+    if share > 0.0 && share.is_finite() { Ok(share * unit) } else { Err("the share must be positive".into()) }
+}
+
+impl Args {
+    fn options(&self) -> Result<FitOptions, Failure> {
+        let model = match &self.model {
+            Wanted::Model(model) => model.clone(),
+            Wanted::Auto => "lambert".parse().map_err(|e: SpecError| Failure::work(e.to_string()))?,
+        };
+        Ok(FitOptions {
+            loss: self.loss,
+            robust: self.robust,
+            weights: self.weights,
+            use_sigma: self.use_sigma,
+            max_angle_deg: self.max_angle,
+            stride: self.stride,
+            per_channel: self.per_channel,
+            limits: self.fix.iter().chain(&self.bound).cloned().collect(),
+            conserve_energy: self.conserve_energy,
+            time_budget: self.time_budget,
+            target_rmse_excess: self.target_rmse_excess,
+            bootstrap: self.bootstrap.map(|replicates| Bootstrap { replicates, seed: self.seed }),
+            ..FitOptions::new(model)
+        })
+    }
+}
+
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let targets = targets(args)?;
     if let Some(out) = &args.out {
@@ -65,26 +148,45 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     if let Some(folder) = &args.out_dir {
         std::fs::create_dir_all(folder).map_err(|e| Failure::output(folder, &e))?;
     }
+    let options = args.options()?;
+    let reading = args.reading.options();
     let (mut text, mut results, mut failures) = (String::new(), Vec::new(), Vec::new());
-    for (file, target) in args.files.iter().zip(&targets) {
-        if ui::stop().requested() {
-            break;
-        }
-        match one(args, file, target.as_deref(), ui) {
-            Ok((said, object)) => {
-                ui.has_something_to_keep();
-                text.push_str(&said);
-                results.push(object);
+    // The next file is read while this one is fitted.
+    let done = std::thread::scope(|scope| {
+        let (scope, reading) = (scope, &reading);
+        let read = |file: &PathBuf| {
+            let file = file.clone();
+            scope.spawn(move || formats::read(&file, reading))
+        };
+        let mut ahead = args.files.first().map(&read);
+        for (k, (file, target)) in args.files.iter().zip(&targets).enumerate() {
+            let table = ahead.take().map(std::thread::ScopedJoinHandle::join);
+            if ui::stop().requested() {
+                break;
             }
-            // Several files: the others are still fitted, and the failures told at the end.
-            Err(failure) if args.files.len() > 1 => {
-                ui.warn(&failure.message);
-                results.push(json!({ "file": file, "error": failure.message }));
-                failures.push(failure);
+            ahead = args.files.get(k + 1).map(&read);
+            let table = match table {
+                Some(Ok(read)) => read.map_err(Failure::from),
+                _ => Err(Failure::work(format!("{}: the reader failed", file.display()))),
+            };
+            match table.and_then(|table| one(args, &options, file, &table, target.as_deref(), ui)) {
+                Ok((said, object)) => {
+                    ui.has_something_to_keep();
+                    text.push_str(&said);
+                    results.push(object);
+                }
+                // Several files: the others are still fitted, and the failures told at the end.
+                Err(failure) if args.files.len() > 1 => {
+                    ui.warn(&failure.message);
+                    results.push(json!({ "file": file, "error": failure.message }));
+                    failures.push(failure);
+                }
+                Err(failure) => return Err(failure),
             }
-            Err(failure) => return Err(failure),
         }
-    }
+        Ok(())
+    });
+    done?;
     let object = match (args.files.len(), results.pop()) {
         (1, Some(only)) => only,
         (_, last) => json!({ "fits": results.into_iter().chain(last).collect::<Vec<_>>() }),
@@ -123,18 +225,21 @@ fn targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
     Ok(targets.into_iter().map(Some).collect())
 }
 
-fn one(args: &Args, file: &Path, target: Option<&Path>, ui: &Ui) -> Result<(String, Value), Failure> {
-    let table = formats::read(file, &args.reading.options())?;
+fn one(
+    args: &Args,
+    options: &FitOptions,
+    file: &Path,
+    table: &Measurement,
+    target: Option<&Path>,
+    ui: &Ui,
+) -> Result<(String, Value), Failure> {
     for note in &table.notes {
         ui.note(&format!("{}: note: {note}", file.display()));
     }
-    let options = FitOptions {
-        loss: args.loss,
-        weights: args.weights,
-        max_angle_deg: args.max_angle,
-        ..FitOptions::new(args.model.clone())
+    let fitted = match args.model {
+        Wanted::Auto => fit_best_model(table, options)?,
+        Wanted::Model(_) => fit(table, options)?,
     };
-    let fitted = fit(&table, &options)?;
     if args.log {
         log(&fitted, ui);
     }
@@ -193,17 +298,76 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
             continue;
         };
         for (i, parameter) in lobe.kind.lobe().parameters().iter().enumerate() {
-            let error = match record.standard_error.get(l).and_then(|r| r.shape.get(i)) {
-                Some((_, PerChannel::Shared(error))) => *error,
-                _ => None,
-            };
-            let value = shape.get(i).and_then(|v| v.get(0)).unwrap_or(f64::NAN);
-            let _ = writeln!(t, "  {:22} {}", format!("{name}.{}", parameter.name), plus_minus(value, error));
+            let error = record.standard_error.get(l).and_then(|r| r.shape.get(i)).map(|(_, e)| e);
+            let label = format!("{name}.{}", parameter.name);
+            match &shape[i] {
+                PerChannel::Shared(value) => {
+                    let error = error.and_then(|e| e.get(0)).flatten();
+                    let _ = writeln!(t, "  {label:22} {}", plus_minus(*value, error));
+                }
+                PerChannel::Each(values) => {
+                    for (c, value) in values.iter().enumerate() {
+                        let error = error.and_then(|e| e.get(c)).flatten();
+                        let label = format!("{label}[{}]", material.channels[c]);
+                        let _ = writeln!(t, "  {label:22} {}", plus_minus(*value, error));
+                    }
+                }
+            }
         }
     }
+    t.push_str(&evidence(record));
     for warning in &record.warnings {
         let _ = writeln!(t, "  warning: {warning}");
     }
+    t
+}
+
+/// What else the numbers say: the noise and the model's own error, how the minimum was found, how the model was chosen.
+fn evidence(record: &FitRecord) -> String {
+    let mut t = String::new();
+    if let Some(r) = &record.residual {
+        let from = if r.noise_from == "sigma" { "as the file states" } else { "from neighbours" };
+        let _ = writeln!(
+            t,
+            "  residuals: noise {:.2e} ({from}), model error {:.2e}; worth {:.0} independent samples",
+            r.noise_rmse, r.model_rmse, r.effective_samples
+        );
+    }
+    if let Some(s) = record.search.as_ref().filter(|s| s.starts > 1) {
+        let others = match s.runner_up_excess {
+            Some(excess) => format!("; the next minimum costs {:.2} % more", 100.0 * excess),
+            None => String::new(),
+        };
+        let unseen = s.unseen_chance.map_or(String::new(), |p| format!("; chance of one not seen {:.1} % a start", 100.0 * p));
+        let _ = writeln!(t, "  search: {} of {} starts end in the lowest minimum{others}{unseen}", s.reached, s.starts);
+    }
+    if let Some(s) = &record.subset {
+        let _ = writeln!(
+            t,
+            "  {} of about {} directions used: rmse over all within {:.2} % of the best (95 %)",
+            s.samples,
+            s.of,
+            100.0 * s.rmse_excess_95
+        );
+    }
+    if let Some(choice) = &record.choice {
+        t.push_str(&comparison(choice));
+    }
+    t
+}
+
+/// The models compared, as a table.
+fn comparison(choice: &ModelChoice) -> String {
+    let mut t = String::from("  model                      parameters  rmse       held out   AICc       BIC\n");
+    for c in &choice.candidates {
+        let mark = if c.model == choice.chosen { "*" } else { " " };
+        let _ = writeln!(
+            t,
+            "{mark} {:28} {:8}  {:.3e}  {:.3e}  {:9.1}  {:9.1}",
+            c.model, c.parameters, c.rmse, c.held_out_rmse, c.aicc, c.bic
+        );
+    }
+    let _ = writeln!(t, "  chosen: {}: {}", choice.chosen, choice.reason);
     t
 }
 

@@ -6,7 +6,7 @@ use super::covariance::Uncertainty;
 use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
 use super::part::{self, Part};
-use super::samples::Samples;
+use super::samples::{Samples, Thin};
 use crate::brdf::ModelSpec;
 use crate::measurement::Measurement;
 use crate::numeric::stats::chi_square_quantile;
@@ -45,7 +45,7 @@ pub(super) fn fit(
     let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
     loop {
         let began = Instant::now();
-        let (samples, transforms) = Samples::gather(measurement, model, options, channels, thin)?;
+        let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 })?;
         let mut part = part::fit(&samples, transforms, model, ranges, options)?;
         if thin == 1 {
             return Ok(part);

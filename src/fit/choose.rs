@@ -4,11 +4,11 @@ use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
 use super::part;
 use super::passes::{self, Want};
-use super::samples::Samples;
+use super::samples::{Samples, Thin};
 use super::{Fitted, fit};
 use crate::brdf::{ModelCandidate, ModelChoice, ModelSpec};
 use crate::geometry::theta_of;
-use crate::measurement::Measurement;
+use crate::measurement::{Directions, Measurement, MerlGrid};
 
 /// The models that are compared, simplest first.
 const CANDIDATES: [&str; 6] =
@@ -29,7 +29,7 @@ const AS_GOOD: f64 = 0.01;
 pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
     options.validate(measurement)?;
     let mut candidates = Vec::new();
-    let mut effective = f64::INFINITY;
+    let mut effective = measurement.len() as f64;
     for name in CANDIDATES {
         let spec: ModelSpec = name.parse().map_err(|_| FitError::Solver { reason: format!("no model {name}") })?;
         let own = FitOptions { model: spec, bootstrap: None, time_budget: None, ..options.clone() };
@@ -57,7 +57,9 @@ fn candidate(measurement: &Measurement, options: &FitOptions) -> Result<(ModelCa
     let ranges = Ranges::new(&model, &measurement.channels, &options.limits)?;
     let all: Vec<usize> = (0..measurement.channels.len()).collect();
     let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![&all] };
-    let thin = measurement.len().div_ceil(SAMPLES);
+    // Whole lines of a table, so that neighbours stay neighbours.
+    let run = if matches!(measurement.directions, Directions::Merl(_)) { MerlGrid::PHI_D } else { 1 };
+    let thin = Thin { step: measurement.len().div_ceil(SAMPLES), run };
     let (mut cost, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
     let mut effective = Some(0.0);
     for group in groups {

@@ -31,6 +31,9 @@ pub(super) struct Uncertainty {
     pub bread: DMatrix<f64>,
     /// Standard errors if the residuals of neighbours are taken as one error, not many: what model error does to the parameters.
     pub structured: Vec<f64>,
+    /// How many samples are worth one independent one, at least 1: by how much the parameters scatter more than if residuals were independent
+    /// (Kish's design effect).
+    pub design_effect: f64,
     /// Products of neighbours' residuals.
     pub neighbours: Neighbours,
     /// Σ w σ_r² over samples and channels with a stated σ, and how many there are.
@@ -129,12 +132,15 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         errors[i] = None;
     }
     let grouped = sandwich.covariance(&(clusters * (count as f64 / (count as f64 - 1.0).max(1.0))), &[]);
+    let drawn = sandwich.covariance(&drawn, &[]);
+    let design_effect = (&normal * &grouped).trace() / (&normal * &drawn).trace();
     Uncertainty {
         cost,
+        design_effect: if design_effect > 1.0 { design_effect } else { 1.0 },
         errors,
         structured: grouped.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
         covariance,
-        drawn: sandwich.covariance(&drawn, &[]),
+        drawn,
         normal,
         bread: sandwich.bread,
         neighbours,

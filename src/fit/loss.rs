@@ -239,7 +239,7 @@ impl std::fmt::Display for Robust {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{Lobe, LobeKind};
+    use crate::brdf::LobeKind;
     use nalgebra::Complex;
 
     type C = Complex<f64>;
@@ -267,7 +267,7 @@ mod tests {
                     let (real, h) = (C::new(f, 0.0), C::new(0.0, STEP));
                     let at = |f: C, y: C| complex_residual(loss, f, y, c, datum.epsilon);
                     let r = at(real, C::new(y, 0.0)).re;
-                    let size = r.abs().max(loss.residual(0.0, datum).abs());
+                    let size = r.abs().max(loss.residual(0.0, datum).abs()) + 3e-3; // the complex logarithm rounds 1 + u
                     assert!((loss.residual(f, datum) - r).abs() <= 1e-13 * size, "{loss:?} {f} {y}");
                     let slope = at(real + h, C::new(y, 0.0)).im / STEP;
                     assert!((loss.slope(f, datum) / slope - 1.0).abs() < 1e-9, "{loss:?} {f} {y}");

@@ -40,7 +40,7 @@ pub use options::{Bootstrap, FitError, FitOptions, WeightMode};
 pub use solver::Stop;
 
 use limits::Ranges;
-use samples::Samples;
+use samples::{Samples, Thin};
 
 /// A fitted material and what the caller may want besides its file.
 #[derive(Debug, Clone)]
@@ -71,7 +71,7 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let samples = if let [part] = &parts[..] {
         part.samples
     } else {
-        Samples::gather(measurement, &model, options, &all, 1)?.0.len()
+        Samples::gather(measurement, &model, options, &all, Thin::NONE)?.0.len()
     };
     let facts = record::Facts { measurement, options, model: &model, ranges: &ranges, parts: &parts, samples };
     let mut material = record::material(&facts);
@@ -95,7 +95,7 @@ fn fit_part(
     if options.time_budget.is_some() || options.target_rmse_excess.is_some() {
         return budget::fit(measurement, model, ranges, options, channels, clock);
     }
-    let (samples, transforms) = Samples::gather(measurement, model, options, channels, 1)?;
+    let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin::NONE)?;
     let mut part = part::fit(&samples, transforms, model, ranges, options)?;
     if let Some(draws) = options.bootstrap {
         part.bootstrap = Some(bootstrap::bootstrap(&samples, &part, model, ranges, options, draws)?);

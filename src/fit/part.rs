@@ -204,7 +204,12 @@ fn finish(
         epsilon: samples.epsilon.clone(),
         layout: problem.layout.clone(),
         bounds: problem.bounds.clone(),
-        structure: structure::structure(rmse, stated, &uncertainty.neighbours, residuals),
+        structure: structure::structure(
+            rmse,
+            stated,
+            &uncertainty.neighbours,
+            residuals as f64 / uncertainty.design_effect,
+        ),
         saturation: problem.saturation,
         stop: found.outcome.stop,
         history: found.outcome.history,

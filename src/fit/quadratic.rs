@@ -27,9 +27,12 @@ enum Stand {
 /// ends of their ranges is tried, so the minimum is global. Undetermined directions get the minimum-norm solution (columns
 /// scaled to unit norm). NaN in, NaN out.
 pub(super) fn minimise(gram: &DMatrix<f64>, b: &DVector<f64>, feasible: &Feasible<'_>) -> DVector<f64> {
+    if gram.iter().chain(b).any(|v| v.is_nan()) {
+        return DVector::repeat(b.len(), f64::NAN);
+    }
     // Where all may be free that is the minimum; of equal minima it has the smallest norm.
     let free = solve_free(gram, b);
-    if free.iter().any(|v| v.is_nan()) || (feasible.holds(&free) && !feasible.pinned()) {
+    if feasible.holds(&free) && !feasible.pinned() {
         return free;
     }
     let value = |x: &DVector<f64>| x.dot(&(gram * x)) - 2.0 * x.dot(b);

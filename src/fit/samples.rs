@@ -214,14 +214,13 @@ struct Survey {
 }
 
 impl<'a> Samples<'a> {
-    /// Selects and prepares the samples of the given channels; with them, where they come on the way, their transforms. Of every `thin`
-    /// entries in a row only one counts, at a place that varies.
+    /// Selects and prepares the samples of the given channels; with them, where they come on the way, their transforms.
     pub fn gather(
         measurement: &'a Measurement,
         model: &ModelSpec,
         options: &FitOptions,
         channels: &[usize],
-        thin: usize,
+        thin: Thin,
     ) -> Result<(Self, Option<Transforms>), FitError> {
         let solid_angle = options.weights == WeightMode::SolidAngle && measurement.weights.known();
         let weighting = match (options.use_sigma, solid_angle) {
@@ -244,7 +243,7 @@ impl<'a> Samples<'a> {
             weighting,
         };
         let mut transforms = None;
-        if let Some(lines) = samples.lines(options, solid_angle).filter(|_| thin == 1) {
+        if let Some(lines) = samples.lines(options, solid_angle).filter(|_| thin.step == 1) {
             transforms = samples.fold(&lines)?;
             samples.source = Source::Merl(lines);
         } else {
@@ -456,7 +455,7 @@ impl<'a> Samples<'a> {
         kind: Option<LobeKind>,
         options: &FitOptions,
         solid_angle: bool,
-        thin: usize,
+        thin: Thin,
     ) -> Result<(), FitError> {
         let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle, kind, thin };
         let parts = sum::map_blocks(self.measurement.len(), |range| judge.list(range));
@@ -524,7 +523,7 @@ impl<'a> Samples<'a> {
     fn settle(&mut self, survey: &Survey, options: &FitOptions) -> Result<(), FitError> {
         if survey.directions == 0 {
             // Only a table comes here: the lists say themselves what is missing.
-            let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle: false, kind: None, thin: 1 };
+            let judge = Judge { samples: self, options, least_cos: least_cos(options), solid_angle: false, kind: None, thin: Thin::NONE };
             let reasons = sum::map_blocks(self.measurement.len(), |range| judge.list(range).1);
             let mut left = Left::default();
             reasons.iter().for_each(|r| left.add(r));
@@ -659,7 +658,24 @@ struct Judge<'a> {
     least_cos: f64,
     solid_angle: bool,
     kind: Option<LobeKind>,
-    thin: usize,
+    thin: Thin,
+}
+
+/// Which entries of a measurement are looked at: of every `step` runs of `run` entries one, at a place that varies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Thin {
+    pub step: usize,
+    pub run: usize,
+}
+
+impl Thin {
+    /// All of them.
+    pub const NONE: Self = Self { step: 1, run: 1 };
+
+    fn keeps(self, entry: usize) -> bool {
+        let run = entry / self.run;
+        self.step == 1 || run % self.step == offset(run / self.step, self.step)
+    }
 }
 
 /// Which of the `step` entries of run `run` a thinned-out list keeps: spread evenly, without a beat with the grid's own period.
@@ -710,9 +726,7 @@ impl Judge<'_> {
         let (mut block, mut left) = (Block::default(), Left::default());
         block.reset(channels, channels);
         let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
-                let counts = |e: &usize| {
-            e.is_multiple_of(self.options.stride) && (self.thin == 1 || e % self.thin == offset(e / self.thin, self.thin))
-        };
+                let counts = |e: &usize| e.is_multiple_of(self.options.stride) && self.thin.keeps(*e);
         for entry in range.filter(counts) {
             left.entries += 1;
             let (wi, wo) = self.samples.measurement.directions.pair(entry);

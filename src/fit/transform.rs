@@ -24,10 +24,10 @@ const BASE: u64 = ((1023 + LOWEST) as u64) << SPLIT;
 /// Bits of an f64 below the bin's number.
 const BELOW: u32 = 52 - SPLIT;
 
-/// The bin that |x| = `v` falls into.
+/// The bin that |x| falls into.
 #[inline(always)]
-fn bin_number(v: f64) -> usize {
-    ((v.to_bits() >> BELOW).saturating_sub(BASE - 1) as usize).min(BINS - 1)
+fn bin_number(x: f64) -> usize {
+    ((x.abs().to_bits() >> BELOW).saturating_sub(BASE - 1) as usize).min(BINS - 1)
 }
 
 /// Centre and half width of a bin.
@@ -161,7 +161,7 @@ impl<const M: usize> Kernel for Absorb<'_, M> {
                 (0..M).for_each(|m| into.dark[m] += values[m][i]);
                 continue;
             }
-            let own = bin_number(-x[i]);
+            let own = bin_number(x[i]);
             if own != bin || inverse == 0.0 {
                 into.flush(bin, &held);
                 held = [[0.0; MOMENTS]; M];
