@@ -2,6 +2,8 @@
 #![allow(clippy::expect_used, clippy::panic)] // these are tests
 
 mod degenerate;
+mod experiment;
+mod hard;
 mod invariance;
 mod optimum;
 mod recovery;

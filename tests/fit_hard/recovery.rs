@@ -8,7 +8,7 @@ use crate::support::*;
 
 /// How far rounding the data to f64 moves the solution, relative to each parameter: the standard deviation of J⁺ dy with each value's dy
 /// even within half a unit of its last place, J by the formulas of the reference.
-fn data_rounding(m: &Measurement, o: &FitOptions, truth: &[f64]) -> f64 {
+pub fn data_rounding(m: &Measurement, o: &FitOptions, truth: &[f64]) -> f64 {
     use nalgebra::{DMatrix, DVector};
     let reference = crate::reference::Reference::new(m, o);
     let k = truth.len();
