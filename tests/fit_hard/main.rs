@@ -1,6 +1,7 @@
 //! The hard cases of the fit: where other fits break, each with a test of its own.
 #![allow(clippy::expect_used, clippy::panic)] // these are tests
 
+mod asked;
 mod degenerate;
 mod experiment;
 mod hard;
