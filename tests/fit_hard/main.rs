@@ -2,11 +2,13 @@
 #![allow(clippy::expect_used, clippy::panic)] // these are tests
 
 mod asked;
+mod coverage;
 mod degenerate;
 mod experiment;
 mod hard;
 mod invariance;
 mod optimum;
+mod properties;
 mod recovery;
 mod reference;
 mod support;

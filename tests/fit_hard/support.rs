@@ -177,12 +177,15 @@ pub fn assert_finite(m: &Material) {
 }
 
 /// What is stated and wrong: parameters with a 95 % interval whose truth lies more than four times as far off as its end (normal errors do that
-/// once in 10¹⁴ fits).
+/// once in 10¹⁴ fits). For an exponent, whose error is even on the logarithmic scale, upwards by the farther of the two scales.
 pub fn made_up(got: &Material, truth: &[f64], slack: f64) -> Option<String> {
-    let off = parameters(got).into_iter().zip(intervals(got)).zip(truth).any(|((value, interval), truth)| {
+    let weights = got.channels.len() * got.lobes.len();
+    let off = parameters(got).into_iter().zip(intervals(got)).zip(truth).enumerate().any(|(i, ((value, interval), truth))| {
         interval.is_some_and(|(low, high)| {
             let slack = slack * truth.abs();
-            *truth < value - 4.0 * (value - low) - slack || *truth > value + 4.0 * (high - value) + slack
+            let ratio = if i >= weights && value > 0.0 { value * (high / value).powi(4) } else { 0.0 };
+            let most = f64::max(value + 4.0 * (high - value), ratio);
+            *truth < value - 4.0 * (value - low) - slack || *truth > most + slack
         })
     });
     off.then(|| format!("{:?} in {:?}, true {truth:?}", parameters(got), intervals(got)))
