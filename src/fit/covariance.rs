@@ -19,6 +19,8 @@ pub type Interval = (f64, f64);
 pub(super) struct Uncertainty {
     /// Σ w r² from true residuals (robust: Σ w s² ρ).
     pub cost: f64,
+    /// Whether a channel has a sample where the lobes with a shape are 0 whatever it is.
+    pub dark: Vec<bool>,
     /// Standard error of each parameter; `None` where the data don't determine it.
     pub errors: Vec<Option<f64>>,
     /// Covariance, rows and columns of undetermined parameters meaningless.
@@ -127,15 +129,13 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     }
     let sandwich = Sandwich::new(&normal);
     let covariance = sandwich.covariance(&spread, &common);
-    let mut errors = sandwich.errors(&covariance);
-    for i in confounded(problem, at, &dark) {
-        errors[i] = None;
-    }
+    let errors = sandwich.errors(&covariance);
     let grouped = sandwich.covariance(&(clusters * (count as f64 / (count as f64 - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&drawn, &[]);
     let design_effect = (&normal * &grouped).trace() / (&normal * &drawn).trace();
     Uncertainty {
         cost,
+        dark,
         design_effect: if design_effect > 1.0 { design_effect } else { 1.0 },
         errors,
         structured: grouped.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
@@ -159,30 +159,6 @@ fn place(problem: &Problem<'_>, channels: usize, channel: usize) -> Vec<usize> {
     let lobes = problem.kinds.len();
     let shapes = channels * lobes..channels * lobes + problem.layout.len();
     (channel * lobes..(channel + 1) * lobes).chain(shapes).collect()
-}
-
-/// Parameters that a lobe at n → 0 shares with the diffuse lobe. A Phong lobe of exponent 0 is diffuse on all samples where it is not 0; where
-/// the search ends at that end, or the lobe has no weight and so could stand there, the two can be told apart only by samples behind
-/// the mirror direction.
-fn confounded(problem: &Problem<'_>, at: &Solution, dark: &[bool]) -> Vec<usize> {
-    let lobes = problem.kinds.len();
-    let Some(diffuse) = problem.kinds.iter().position(|k| k.lobe().parameters().is_empty()) else { return Vec::new() };
-    let mut list = Vec::new();
-    for (i, (lobe, parameter)) in problem.layout.iter().enumerate() {
-        let own = problem.bounds[i];
-        let searched = own.0 < own.1 && own.0 <= parameter.bounds.0.ln();
-        let unlit = at.weights.iter().all(|x| x[*lobe] == 0.0);
-        if !searched || !(unlit || at.t[i] <= own.0) {
-            continue;
-        }
-        let same = (0..at.weights.len()).filter(|&c| !dark[c]).filter(|&c| {
-            [diffuse, *lobe].iter().all(|&l| problem.ranges[c][l].0 < problem.ranges[c][l].1)
-        });
-        for c in same {
-            list.extend([c * lobes + diffuse, c * lobes + lobe, at.weights.len() * lobes + i]);
-        }
-    }
-    list
 }
 
 /// A⁻¹ where it exists.

@@ -119,34 +119,34 @@ impl Loss {
         self != Self::Log
     }
 
-    /// What of a datum the residual needs: r = T(f) − target. Found once a sample.
-    pub(super) fn target(self, datum: Datum) -> f64 {
-        match self {
-            Self::Log => (datum.cos_i * datum.value).ln_1p(),
-            Self::CubeRoot => (datum.cos_i * datum.value).cbrt(),
-            Self::L2 | Self::CosineL2 | Self::Relative => datum.value,
-        }
-    }
-
-    /// (r, ∂r/∂f) from a prepared target; `gain` is the ∂r/∂f of a linear loss. Where `f` is 0 the cube root's slope is that of the
+    /// (r, ∂r/∂f) in vectorisable arithmetic; `gain` is the ∂r/∂f of a linear loss. Where `f` is 0 the cube root's slope is that of the
     /// smallest f that matters.
     #[inline(always)]
-    pub(super) fn prepared(self, f: f64, cos_i: f64, gain: f64, target: f64) -> (f64, f64) {
+    pub(super) fn evaluate(self, f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
         match self {
             Self::Log => {
                 let u = cos_i * f;
-                (ln_1p(u) - target, cos_i / (1.0 + u))
+                (ln_1p(u) - ln_1p(cos_i * y), cos_i / (1.0 + u))
             }
             Self::CubeRoot => {
-                let u = (cos_i * f).max(CUBE_FLOOR);
-                let root = exp(ln(u) * (1.0 / 3.0));
-                // One Newton step on root³ = u takes the last digits.
-                let root = root - (root * root).mul_add(root, -u) / (3.0 * root * root);
-                (if f > 0.0 { root - target } else { -target }, cos_i / (3.0 * root * root))
+                let root = cube_root(cos_i * f);
+                let steep = cube_root((cos_i * f).max(CUBE_FLOOR));
+                (root - cube_root(cos_i * y), cos_i / (3.0 * steep * steep))
             }
-            Self::L2 | Self::CosineL2 | Self::Relative => (gain * (f - target), gain),
+            Self::L2 | Self::CosineL2 | Self::Relative => (gain * (f - y), gain),
         }
     }
+}
+
+/// ∛u to a unit in the last place.
+#[inline(always)]
+fn cube_root(u: f64) -> f64 {
+    let size = u.abs();
+    let root = exp(ln(size) * (1.0 / 3.0));
+    // One Newton step on root³ = u takes the last digits.
+    let root = root - (root * root).mul_add(root, -size) / (3.0 * root * root);
+    let root = if size < f64::MIN_POSITIVE { 0.0 } else { root };
+    if u < 0.0 { -root } else { root }
 }
 
 /// Smallest c·f (in the fit's scale, where the largest value is about 1) whose cube root's slope is told apart.
@@ -267,13 +267,14 @@ mod tests {
                     let (real, h) = (C::new(f, 0.0), C::new(0.0, STEP));
                     let at = |f: C, y: C| complex_residual(loss, f, y, c, datum.epsilon);
                     let r = at(real, C::new(y, 0.0)).re;
-                    let size = r.abs().max(loss.residual(0.0, datum).abs()) + 3e-3; // the complex logarithm rounds 1 + u
+                    // The complex logarithm rounds 1 + u, and large values cancel.
+                    let size = r.abs().max(loss.residual(0.0, datum).abs()) + 3e-3;
                     assert!((loss.residual(f, datum) - r).abs() <= 1e-13 * size, "{loss:?} {f} {y}");
                     let slope = at(real + h, C::new(y, 0.0)).im / STEP;
                     assert!((loss.slope(f, datum) / slope - 1.0).abs() < 1e-9, "{loss:?} {f} {y}");
                     let data = at(real, C::new(y, STEP)).im / STEP;
                     assert!((loss.data_slope(f, datum) / data.abs() - 1.0).abs() < 1e-9, "{loss:?} {f} {y}");
-                    let (r2, s2) = loss.prepared(f, c, loss.slope(f, datum), loss.target(datum));
+                    let (r2, s2) = loss.evaluate(f, c, loss.slope(f, datum), y);
                     assert!((r2 - r).abs() <= 1e-13 * size && (s2 / slope - 1.0).abs() < 1e-9, "{loss:?} {f} {y}");
                 }
             }

@@ -1,12 +1,17 @@
 //! One fit of channels that share their shapes, from samples to intervals.
 
+use nalgebra::DVector;
+
 use super::budget::Subset;
 use super::covariance::{self, Uncertainty};
+use super::identify;
 use super::intervals::{self, Intervals};
+use super::joint::{self, Digits};
 use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
-use super::passes::{self, Saturation, Scratch};
+use super::passes::{self, Saturation};
 use super::reduced::{Problem, Search, Solution, Streamed, polish};
+use super::robust;
 use super::samples::{self, Samples, Transforms};
 use super::solver::{self, Iteration, LevenbergMarquardt, Stop};
 use super::start::{self, SearchReport};
@@ -46,6 +51,9 @@ pub(super) struct Part {
 const LOST_COST: f64 = 1e-6;
 const LOST_CONDITION: f64 = 1e8;
 
+/// Values of a table whose last digits are worth many passes.
+pub(super) const SMALL: usize = 200_000;
+
 /// Fits the samples.
 pub(super) fn fit(
     samples: &Samples<'_>,
@@ -71,9 +79,17 @@ pub(super) fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Par
     let energy: f64 = search.energy.iter().sum();
     if solution.cost < LOST_COST * energy || condition(search, &solution) > LOST_CONDITION {
         solution = polish(search, solution);
+        if search.problem.samples.residuals() <= SMALL {
+            let start = solution.clone();
+            let (polished, _) = descend(search.problem, start, options.max_iterations, Digits::All)?;
+            if polished.cost <= solution.cost {
+                solution = polished;
+            }
+        }
     }
     let moments = search.moments(&solution.lobes, true);
-    let uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments));
+    let mut uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments));
+    identify::by_search(search, &solution, &mut uncertainty);
     solution.cost = uncertainty.cost;
     let intervals = intervals::profiled(search, &solution, &uncertainty);
     finish(search.problem, solution, uncertainty, intervals, found)
@@ -92,91 +108,61 @@ fn condition(search: &Search<'_>, at: &Solution) -> f64 {
     moments.gram.iter().map(of).fold(1.0, f64::max)
 }
 
-/// Samples that the search for a start looks at.
+/// Samples that the search for a start looks at, and those that its first round does.
 const START_SAMPLES: usize = 6000;
-/// Rounds in which the robust scale settles, and the relative change at which it has.
-const SCALE_ROUNDS: usize = 40;
-const SCALE_SETTLED: f64 = 1e-9;
+const FIRST_SAMPLES: usize = 600;
 
 /// Any other loss: passes over the samples, the start from a part of them.
 fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitError> {
     let samples = problem.samples;
-    let step = samples.len().div_ceil(START_SAMPLES).max(1);
-    let few = samples.listed(|i| i % step == samples::offset(i / step, step));
-    let mut rough = problem.on(&few);
-    let mut found = start::search_streamed(&rough, options.max_iterations)?;
-    let mut solution = Streamed::new(&rough).solve(found.outcome.t.as_slice());
+    let thinned = |count: usize| {
+        let step = samples.len().div_ceil(count).max(1);
+        samples.listed(|i| i % step == samples::offset(i / step, step))
+    };
+    let (few, more) = (thinned(FIRST_SAMPLES), thinned(START_SAMPLES));
+    let (few, more, mut problem) = (problem.on(&few), problem.on(&more), problem.on(samples));
+    let mut found = if problem.is_transformable() {
+        // Outliers aside the loss is linear: its plain fit is quick.
+        let (transform, energy) = passes::transform(problem.samples);
+        start::search(&Search::new(&problem, &transform, &energy), options.max_iterations)?
+    } else {
+        start::search_streamed(&few, &more, options.max_iterations)?
+    };
+    let mut solution = Streamed::new(&problem).solve(found.outcome.t.as_slice());
     if options.robust.is_some() {
-        // The scale of the plain fit's residuals is too large where outliers pull it; it shrinks as they let go.
-        for _ in 0..3 {
-            rough.saturation = passes::saturation(options.robust, spread(&rough, &solution));
-            found = start::search_streamed(&rough, options.max_iterations)?;
-            solution = Streamed::new(&rough).solve(found.outcome.t.as_slice());
-        }
+        solution = robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
+        found.report = start::SearchReport::default();
     }
-    let all = samples.listed(|_| true);
-    let mut problem = problem.on(&all);
-    let mut history = Vec::new();
-    let mut stop = found.outcome.stop;
-    for _ in 0..SCALE_ROUNDS {
-        let before = problem.saturation;
-        problem.saturation = passes::saturation(options.robust, spread(&problem, &solution));
-        if let (Some((_, old)), Some((_, new))) = (before, problem.saturation)
-            && (new / old - 1.0).abs() <= SCALE_SETTLED
-        {
-            problem.saturation = before;
-            break;
-        }
-        let streamed = Streamed::from(&problem, solution.clone());
-        let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
-        let start = nalgebra::DVector::from_column_slice(&solution.t);
-        let outcome = solver::minimize(&streamed, lm, start, options.max_iterations)
-            .map_err(|e| FitError::Solver { reason: e.to_string() })?;
-        solution = streamed.solve(outcome.t.as_slice());
-        stop = outcome.stop;
-        history.extend(outcome.history);
-        if options.robust.is_none() {
-            break;
-        }
-    }
-    found.outcome.stop = stop;
-    found.outcome.history = history;
-    let uncertainty = covariance::uncertainty(&problem, &solution, None);
-    solution.cost = uncertainty.cost;
+    let (solution, outcome) = descend(&problem, solution, options.max_iterations, Digits::All)?;
+    found.outcome = outcome;
+    let mut uncertainty = covariance::uncertainty(&problem, &solution, None);
+    let mut part = problem.on(more.samples);
+    part.saturation = problem.saturation;
+    identify::by_passes(&part, &solution, &mut uncertainty);
+    let solution = Solution { cost: uncertainty.cost, ..solution };
     let intervals = intervals::plain(&problem, &solution, &uncertainty);
     finish(&problem, solution, uncertainty, intervals, found)
 }
 
-/// σ of the residuals by their median absolute deviation from their median; where that is 0 (more than half of them are alike), the smallest
-/// that still is a scale.
-fn spread(problem: &Problem<'_>, at: &Solution) -> f64 {
-    let samples = problem.samples;
-    let pieces = samples.map_pieces(|| (Vec::new(), Scratch::default()), |(list, scratch), block| {
-        scratch.basis(block, &at.lobes);
-        for (c, x) in at.weights.iter().enumerate() {
-            scratch.residuals(samples, block, c, x, None);
-            list.extend(scratch.r.iter().zip(block.weight(c)).filter(|(_, w)| **w > 0.0).map(|(r, _)| *r));
-        }
-    });
-    let mut r: Vec<f64> = pieces.into_iter().flat_map(|(list, _)| list).collect();
-    let centre = median(&mut r);
-    r.iter_mut().for_each(|r| *r = (*r - centre).abs());
-    let deviation = median(&mut r);
-    let largest = r.iter().copied().fold(0.0, f64::max);
-    (MAD_TO_SIGMA * deviation).max(1e-13 * largest).max(f64::MIN_POSITIVE.sqrt())
-}
-
-/// σ of normal noise over its median absolute deviation.
-const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
-
-fn median(list: &mut [f64]) -> f64 {
-    if list.is_empty() {
-        return 0.0;
+/// The minimum next to a solution, on all samples, to its last digits or roughly.
+pub(super) fn descend(
+    problem: &Problem<'_>,
+    start: Solution,
+    steps: u64,
+    digits: Digits,
+) -> Result<(Solution, solver::Outcome), FitError> {
+    let failed = |e: argmin::core::Error| FitError::Solver { reason: e.to_string() };
+    if let Some(found) = joint::polish(problem, &start, steps, digits) {
+        let (solution, mut outcome) = found.map_err(failed)?;
+        // The history is of the shapes.
+        let weights = outcome.t.len() - problem.layout.len();
+        outcome.history.iter_mut().for_each(|step| drop(step.parameters.drain(..weights)));
+        return Ok((solution, outcome));
     }
-    let middle = list.len() / 2;
-    let odd = list.len() % 2 == 1;
-    let (below, upper, _) = list.select_nth_unstable_by(middle, f64::total_cmp);
-    if odd { *upper } else { 0.5 * (*upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max)) }
+    let streamed = Streamed::from(problem, start.clone());
+    let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
+    let outcome = solver::minimize(&streamed, lm, DVector::from_column_slice(&start.t), steps).map_err(failed)?;
+    Ok((streamed.solve(outcome.t.as_slice()), outcome))
 }
 
 fn finish(

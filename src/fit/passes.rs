@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::loss::{Loss, Robust, RobustKind};
+use super::loss::{Loss, RobustKind};
 use super::samples::{Block, Samples, Transforms};
 use super::transform::Transform;
 use crate::brdf::LobeKind;
@@ -18,11 +18,6 @@ pub(super) struct ShapedLobe {
 
 /// How residuals count: a robust loss with its s (in the residual's unit), if any.
 pub(super) type Saturation = Option<(RobustKind, f64)>;
-
-/// s of a robust loss for residuals of this σ.
-pub(super) fn saturation(robust: Option<Robust>, sigma: f64) -> Saturation {
-    robust.map(|r| (r.kind, r.scale * sigma))
-}
 
 /// What a pass works out of a block, in lists that are used again for the next one.
 #[derive(Debug, Default)]
@@ -94,14 +89,8 @@ impl Scratch {
             samples.gain(&other.cos_i, y, channel, slope);
             return cost + vectorised(Linear { f: &self.f, y, w, gain: slope, r, pull });
         }
-        let targets: Vec<f64> = if samples.loss.is_linear() {
-            y.clone()
-        } else {
-            let datum = |(y, c): (&f64, &f64)| super::loss::Datum { value: *y, cos_i: *c, epsilon: 0.0 };
-            y.iter().zip(&block.cos_i).map(|p| samples.loss.target(datum(p))).collect()
-        };
         self.trust.resize(n, 0.0);
-        let data = Data { f: &self.f, cos_i: &block.cos_i, target: &targets, w };
+        let data = Data { f: &self.f, cos_i: &block.cos_i, y, w };
         let out = Out { r: &mut self.r, slope: &mut self.slope, trust: &mut self.trust, pull: &mut self.pull };
         vectorised(Evaluate { loss: samples.loss, saturation, data, out })
     }
@@ -431,7 +420,7 @@ impl Kernel for Linear<'_> {
 struct Data<'a> {
     f: &'a [f64],
     cos_i: &'a [f64],
-    target: &'a [f64],
+    y: &'a [f64],
     w: &'a [f64],
 }
 
@@ -457,9 +446,9 @@ impl Kernel for Evaluate<'_> {
     fn run(self) -> f64 {
         // One loop a loss, so that each is free of branches.
         match self.loss {
-            Loss::Log => self.of_loss(|f, c, g, t| Loss::Log.prepared(f, c, g, t)),
-            Loss::CubeRoot => self.of_loss(|f, c, g, t| Loss::CubeRoot.prepared(f, c, g, t)),
-            _ => self.of_loss(|f, _, g, t| (g * (f - t), g)),
+            Loss::Log => self.of_loss(|f, c, g, y| Loss::Log.evaluate(f, c, g, y)),
+            Loss::CubeRoot => self.of_loss(|f, c, g, y| Loss::CubeRoot.evaluate(f, c, g, y)),
+            _ => self.of_loss(|f, _, g, y| (g * (f - y), g)),
         }
     }
 }
@@ -484,12 +473,12 @@ impl Evaluate<'_> {
     #[inline(always)]
     fn each(self, residual: impl Fn(f64, f64, f64, f64) -> (f64, f64), rho: impl Fn(f64) -> (f64, f64)) -> f64 {
         let n = self.data.f.len();
-        let Data { f, cos_i, target, w } = self.data;
-        let (f, cos_i, target, w) = (&f[..n], &cos_i[..n], &target[..n], &w[..n]);
+        let Data { f, cos_i, y, w } = self.data;
+        let (f, cos_i, y, w) = (&f[..n], &cos_i[..n], &y[..n], &w[..n]);
         let (r, slope, trust, pull) =
             (&mut self.out.r[..n], &mut self.out.slope[..n], &mut self.out.trust[..n], &mut self.out.pull[..n]);
         for i in 0..n {
-            (r[i], slope[i]) = residual(f[i], cos_i[i], slope[i], target[i]);
+            (r[i], slope[i]) = residual(f[i], cos_i[i], slope[i], y[i]);
             // The cost waits where the pull will stand.
             (pull[i], trust[i]) = rho(r[i]);
         }

@@ -317,20 +317,28 @@ pub(super) struct Streamed<'a> {
     problem: &'a Problem<'a>,
     /// The last point solved: where the next one's weights start.
     last: RefCell<Option<Solution>>,
+    /// Predicted share of the cost at which the inner iteration ends.
+    tolerance: f64,
 }
 
 /// Steps of the inner iteration at most, and the predicted share of the cost at which it ends.
 const INNER_STEPS: usize = 60;
 const INNER_TOLERANCE: f64 = 1e-15;
+const ROUGH_TOLERANCE: f64 = 1e-7;
 
 impl<'a> Streamed<'a> {
     pub fn new(problem: &'a Problem<'a>) -> Self {
-        Self { problem, last: RefCell::new(None) }
+        Self { problem, last: RefCell::new(None), tolerance: INNER_TOLERANCE }
+    }
+
+    /// Good enough to tell valleys apart.
+    pub fn rough(problem: &'a Problem<'a>) -> Self {
+        Self { tolerance: ROUGH_TOLERANCE, ..Self::new(problem) }
     }
 
     /// Starting at weights known from elsewhere.
     pub fn from(problem: &'a Problem<'a>, start: Solution) -> Self {
-        Self { problem, last: RefCell::new(Some(Solution { t: Vec::new(), ..start })) }
+        Self { last: RefCell::new(Some(Solution { t: Vec::new(), ..start })), ..Self::new(problem) }
     }
 
     /// The weights that minimise the cost at `t`.
@@ -369,7 +377,7 @@ impl<'a> Streamed<'a> {
             let total: f64 = at.iter().map(|s| s.cost).sum();
             let trial: Vec<(DVector<f64>, f64)> =
                 (0..x.len()).map(|c| self.inner_step(c, &x[c], &at[c], damping[c])).collect();
-            if trial.iter().map(|(_, gain)| gain).sum::<f64>() <= INNER_TOLERANCE * total || total == 0.0 {
+            if trial.iter().map(|(_, gain)| gain).sum::<f64>() <= self.tolerance * total || total == 0.0 {
                 break;
             }
             let next: Vec<DVector<f64>> = trial.iter().map(|(x, _)| x.clone()).collect();

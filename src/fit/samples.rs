@@ -109,6 +109,12 @@ impl Block {
         }
     }
 
+    fn reserve(&mut self, samples: usize) {
+        self.index.reserve_exact(samples);
+        [&mut self.cos_i, &mut self.x, &mut self.pairs].into_iter().for_each(|l| l.reserve_exact(samples));
+        self.w.iter_mut().chain(&mut self.y).for_each(|l| l.reserve_exact(samples));
+    }
+
     fn append(&mut self, other: &Self) {
         self.index.extend_from_slice(&other.index);
         self.cos_i.extend_from_slice(&other.cos_i);
@@ -312,7 +318,7 @@ impl<'a> Samples<'a> {
     fn lines(&self, options: &FitOptions, solid_angle: bool) -> Option<MerlLines> {
         let Directions::Merl(grid) = self.measurement.directions else { return None };
         let own = !solid_angle || matches!(self.measurement.weights, crate::measurement::Weights::Merl);
-        let plain = options.loss.is_linear() && !options.use_sigma && options.stride == 1 && own;
+        let plain = options.loss.is_linear() && options.robust.is_none() && !options.use_sigma && options.stride == 1 && own;
         plain.then(|| MerlLines::new(grid, least_cos(options), solid_angle))
     }
 
@@ -462,6 +468,7 @@ impl<'a> Samples<'a> {
         let mut left = Left::default();
         let mut all = Block::default();
         all.reset(self.lists, self.channels.len());
+        all.reserve(parts.iter().map(|(part, _)| part.len()).sum());
         for (part, reasons) in parts {
             all.append(&part);
             left.add(&reasons);
@@ -574,6 +581,30 @@ impl<'a> Samples<'a> {
             position += block.len();
         }
         self.with(all)
+    }
+
+    /// Largest coordinate of all samples; 0, the peak, stands for a table's.
+    pub fn largest_coordinate(&self) -> f64 {
+        match &self.source {
+            Source::Listed(all) => all.x.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            Source::Merl(_) => 0.0,
+        }
+    }
+
+    /// How many distinct coordinates the samples stand at, counted up to `most`.
+    pub fn distinct_coordinates(&self, most: usize) -> usize {
+        let Source::Listed(all) = &self.source else { return most };
+        let mut seen: Vec<f64> = Vec::new();
+        for x in &all.x {
+            let same = |y: &f64| *y == *x || (y - x).abs() <= 1e-12 * x.abs();
+            if !seen.iter().any(same) {
+                seen.push(*x);
+                if seen.len() >= most {
+                    break;
+                }
+            }
+        }
+        seen.len()
     }
 
     /// Direction pair of every sample of a list.

@@ -13,6 +13,8 @@ use crate::numeric::random::{Purpose, RngExt, stream};
 
 /// Combinations of nodes kept while lobes are added one by one.
 const BEAM: usize = 24;
+/// Single lobes from which pairs are built where a cost takes passes.
+const STREAMED_BEAM: usize = 6;
 /// Lattice starts polished at most.
 const MOST_STARTS: usize = 8;
 /// Starts drawn at random on top, for models with several lobes.
@@ -68,8 +70,8 @@ impl Nodes {
         Self { of, t, alike: problem.bounds.windows(2).all(|b| b[0] == b[1]) }
     }
 
-    /// The best combinations, found by adding one lobe at a time and keeping the best few.
-    fn combinations(&self, cost: impl Fn(&[usize]) -> f64 + Sync) -> Vec<Vec<f64>> {
+    /// The best combinations, found by adding one lobe at a time and keeping the best few; of single lobes the best `first`.
+    fn combinations(&self, first: usize, cost: impl Fn(&[usize]) -> f64 + Sync) -> Vec<Vec<f64>> {
         let mut beam: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
         for own in &self.of {
             let mut sets: Vec<Vec<usize>> = Vec::new();
@@ -85,8 +87,7 @@ impl Nodes {
             }
             sets.sort_unstable();
             sets.dedup();
-            // Pairs are tried in full.
-            let keep = if beam[0].1.is_empty() { usize::MAX } else { BEAM };
+            let keep = if beam[0].1.is_empty() && self.of.len() > 1 { first } else { BEAM };
             let mut next: Vec<(f64, Vec<usize>)> = sets.into_par_iter().map(|set| (cost(&set), set)).collect();
             next.sort_by(|a, b| a.0.total_cmp(&b.0));
             next.truncate(keep);
@@ -109,7 +110,7 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
         _ => {
             let nodes = Nodes::new(problem);
             let lattice = Lattice::new(search, &nodes.t);
-            nodes.combinations(|set| lattice.cost(problem, set))
+            nodes.combinations(usize::MAX, |set| lattice.cost(problem, set)) // pairs in full
         }
     };
     if problem.layout.len() > 1 {
@@ -137,23 +138,26 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
     Ok(best)
 }
 
-/// The lowest minimum of a problem that takes passes over its samples.
-pub(super) fn search_streamed(problem: &Problem<'_>, steps: u64) -> Result<Found, FitError> {
-    let starts = if problem.layout.is_empty() {
+/// Starts polished of a problem that takes passes.
+const STREAMED_STARTS: usize = 4;
+
+/// The lowest minimum of a problem that takes passes over its samples: the lattice on `few` of them, its best nodes polished on `more`.
+pub(super) fn search_streamed(few: &Problem<'_>, more: &Problem<'_>, steps: u64) -> Result<Found, FitError> {
+    let starts = if few.layout.is_empty() {
         vec![Vec::new()]
     } else {
-        let nodes = Nodes::new(problem);
+        let nodes = Nodes::new(few);
         let cost = |set: &[usize]| {
-            let part = problem.with_shapes(set.len());
+            let part = few.with_shapes(set.len());
             let t: Vec<f64> = set.iter().map(|&k| nodes.t[k]).collect();
-            Streamed::new(&part).solve(&t).cost
+            Streamed::rough(&part).solve(&t).cost
         };
-        let mut best = nodes.combinations(cost);
-        best.truncate(if problem.layout.len() == 1 { 3 } else { 4 });
+        let mut best = nodes.combinations(STREAMED_BEAM, cost);
+        best.truncate(STREAMED_STARTS);
         best
     };
     let lattice = starts.len();
-    let run = |start: &Vec<f64>| polish_start(&Streamed::new(problem), problem, start.clone(), steps);
+    let run = |start: &Vec<f64>| polish_start(&Streamed::rough(more), more, start.clone(), steps);
     let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
     best_of(outcomes, lattice)
 }

@@ -1,0 +1,103 @@
+//! What the data leave open although the cost curves where the search ended: other ends of the range that are as good.
+
+use nalgebra::DVector;
+
+use super::covariance::Uncertainty;
+use super::reduced::{Problem, Search, Solution, Streamed};
+use super::solver::{self, LevenbergMarquardt, SolverOptions};
+
+/// Cost that a difference of sums does not resolve, as a share of the data's energy.
+const RESOLVED: f64 = 1e-13;
+/// Distinct coordinates that are counted at most.
+const MANY: usize = 64;
+
+/// Marks what the data leave open, the transforms knowing the cost.
+pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &mut Uncertainty) {
+    let resolved = RESOLVED * search.energy.iter().sum::<f64>();
+    let cost = |held: &Problem<'_>, t: Vec<f64>| {
+        let search = search.of(held);
+        let lm = LevenbergMarquardt::new(options()).with_bounds(held.bounds.clone());
+        solver::minimize(&search, lm, DVector::from_vec(t), 30).map_or(f64::INFINITY, |found| found.cost)
+    };
+    let least = search.solve(&at.t).cost.max(0.0);
+    mark(search.problem, at, uncertainty, least, resolved, cost);
+}
+
+/// Marks what the data leave open, by passes over `part`, the same problem on few samples.
+pub(super) fn by_passes(part: &Problem<'_>, at: &Solution, uncertainty: &mut Uncertainty) {
+    let cost = |held: &Problem<'_>, t: Vec<f64>| {
+        let streamed = Streamed::from(held, at.clone());
+        let lm = LevenbergMarquardt::new(options()).with_bounds(held.bounds.clone());
+        solver::minimize(&streamed, lm, DVector::from_vec(t), 30).map_or(f64::INFINITY, |found| found.cost)
+    };
+    let least = cost(part, at.t.clone());
+    mark(part, at, uncertainty, least, RESOLVED * least, cost);
+}
+
+fn options() -> SolverOptions {
+    SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() }
+}
+
+/// A shape that may as well stand at an end of its range is open, and so is what can't be told apart there: at n → 0 a Phong lobe is the diffuse
+/// one on all samples before the mirror direction's horizon; at large n it shows on no sample beside the peak, whatever its weight.
+fn mark(
+    problem: &Problem<'_>,
+    at: &Solution,
+    uncertainty: &mut Uncertainty,
+    least: f64,
+    resolved: f64,
+    cost: impl Fn(&Problem<'_>, Vec<f64>) -> f64,
+) {
+    let (channels, lobes) = (at.weights.len(), problem.kinds.len());
+    let freedom = problem.samples.residuals() as f64 - uncertainty.errors.len() as f64;
+    let rise = uncertainty.quantile.powi(2) * least / freedom.max(1.0) + resolved;
+    let as_good = |i: usize, end: f64| {
+        let mut held = problem.on(problem.samples);
+        held.bounds[i] = (end, end);
+        let mut t = at.t.clone();
+        t[i] = end;
+        cost(&held, t) <= least + rise
+    };
+    let diffuse = problem.kinds.iter().position(|k| k.lobe().parameters().is_empty());
+    let mut open = Vec::new();
+    for (i, (lobe, parameter)) in problem.layout.iter().enumerate() {
+        let (low, high) = problem.bounds[i];
+        let shape = channels * lobes + i;
+        if let Some(diffuse) = diffuse
+            && low < high
+            && low <= parameter.bounds.0.ln()
+            && uncertainty.dark.contains(&false)
+            && as_good(i, low)
+        {
+            let free = |c: usize, l: usize| problem.ranges[c][l].0 < problem.ranges[c][l].1;
+            for c in (0..channels).filter(|&c| !uncertainty.dark[c] && free(c, diffuse) && free(c, *lobe)) {
+                open.extend([c * lobes + diffuse, c * lobes + lobe, shape]);
+            }
+        }
+        if low < high && problem.is_invisible(*lobe, high) && as_good(i, high) {
+            open.push(shape);
+            open.extend((0..channels).map(|c| c * lobes + lobe));
+        }
+    }
+    if too_few_places(problem, channels) {
+        open.extend(0..uncertainty.errors.len());
+    }
+    for i in open {
+        uncertainty.errors[i] = None;
+    }
+}
+
+/// Whether the samples stand at so few distinct coordinates that weights alone reproduce them whatever the shapes.
+fn too_few_places(problem: &Problem<'_>, channels: usize) -> bool {
+    let shapes = problem.bounds.iter().filter(|(low, high)| low < high).count();
+    let places = problem.samples.distinct_coordinates(MANY);
+    shapes > 0 && places < MANY && channels * places.saturating_sub(problem.kinds.len()) < shapes
+}
+
+impl Problem<'_> {
+    /// Whether a lobe of shape eᵗ is 0 on all samples.
+    fn is_invisible(&self, lobe: usize, t: f64) -> bool {
+        let nearest = self.samples.largest_coordinate();
+        self.kinds[lobe].lobe().value(&[t.exp()], nearest, &mut [0.0]) == 0.0
+    }
+}

@@ -1,0 +1,157 @@
+//! The fit in weights and shapes together, on true residuals: where the last digits are won.
+//!
+//! Small tables give their Jacobian row by row, so that its condition number is not squared; large ones its normal matrix.
+
+use argmin::core::Error;
+use nalgebra::{DMatrix, DVector};
+
+use super::passes::{self, Scratch, Want};
+use super::reduced::{Problem, Solution};
+use super::samples::Block;
+use super::solver::{self, LevenbergMarquardt, Linearization, Linearize, Outcome, SolverOptions};
+
+/// Entries of the largest Jacobian that is formed: 32 MB.
+const LARGEST: usize = 4_000_000;
+/// More parameters than this are not searched together.
+const MOST: usize = 60;
+
+/// How far a descent goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Digits {
+    /// Until the cost no longer tells points apart.
+    Rough,
+    /// To the last.
+    All,
+}
+
+/// The problem by all its parameters: weights channel by channel, lobe by lobe, then every t.
+#[derive(Debug)]
+struct Joint<'a> {
+    problem: &'a Problem<'a>,
+    dense: bool,
+}
+
+/// Polishes a solution in all parameters at once. `None` where that can't be: a bound on the weights' sum is no range, and very many
+/// parameters take too long.
+pub(super) fn polish(
+    problem: &Problem<'_>,
+    start: &Solution,
+    steps: u64,
+    digits: Digits,
+) -> Option<Result<(Solution, Outcome), Error>> {
+    let (channels, lobes) = (start.weights.len(), problem.kinds.len());
+    let parameters = channels * lobes + problem.layout.len();
+    let capped = (0..channels).any(|c| problem.feasible(c).free_at(&start.weights[c]).1);
+    if capped || parameters > MOST {
+        return None;
+    }
+    let dense = problem.samples.residuals() * parameters <= LARGEST;
+    let joint = Joint { problem, dense };
+    let ranges = problem.ranges.iter().flatten().chain(&problem.bounds).copied().collect();
+    let (ftol, polish) = match digits {
+        Digits::Rough => (1e-10, 0),
+        Digits::All => (1e-15, 60),
+    };
+    let options = SolverOptions { rank_tol: 1e-14, ftol, polish, ..SolverOptions::default() };
+    let lm = LevenbergMarquardt::new(options).with_bounds(ranges);
+    let p = start.weights.iter().flat_map(|x| x.iter().copied()).chain(start.t.iter().copied());
+    let found = solver::minimize(&joint, lm, DVector::from_iterator(parameters, p), steps);
+    Some(found.map(|outcome| (joint.solution(&outcome.t, outcome.cost), outcome)))
+}
+
+impl Joint<'_> {
+    fn solution(&self, p: &DVector<f64>, cost: f64) -> Solution {
+        let (channels, lobes) = (self.problem.ranges.len(), self.problem.kinds.len());
+        let weights = (0..channels).map(|c| p.rows(c * lobes, lobes).into_owned()).collect();
+        let t = p.rows(channels * lobes, self.problem.layout.len()).as_slice().to_vec();
+        Solution { lobes: self.problem.shaped(&t), t, weights, cost }
+    }
+
+    /// Where a channel's columns stand among all parameters, and what its bare ones are multiplied by.
+    fn columns(&self, at: &Solution, channel: usize) -> (Vec<usize>, Vec<f64>) {
+        let (channels, lobes) = (at.weights.len(), self.problem.kinds.len());
+        let shapes = channels * lobes..channels * lobes + self.problem.layout.len();
+        let place = (channel * lobes..(channel + 1) * lobes).chain(shapes).collect();
+        let slopes = self.problem.layout.iter().map(|(lobe, _)| at.weights[channel][*lobe]);
+        (place, std::iter::repeat_n(1.0, lobes).chain(slopes).collect())
+    }
+
+    fn by_normal(&self, at: &Solution) -> Linearization {
+        let parameters = at.weights.len() * self.problem.kinds.len() + self.problem.layout.len();
+        let sums = passes::sums(self.problem.samples, &at.lobes, &at.weights, self.problem.saturation, Want::All);
+        let (mut normal, mut gradient) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
+        for (c, sums) in sums.iter().enumerate() {
+            let (place, strength) = self.columns(at, c);
+            for (i, &a) in place.iter().enumerate() {
+                gradient[a] += strength[i] * sums.gradient[i];
+                place.iter().enumerate().for_each(|(j, &b)| normal[(a, b)] += strength[i] * strength[j] * sums.normal[(i, j)]);
+            }
+        }
+        Linearization::from_normal(sums.iter().map(|s| s.cost).sum(), normal, &gradient)
+    }
+
+    /// Residuals and Jacobian of every value, robust weights as of here.
+    fn by_rows(&self, at: &Solution) -> Linearization {
+        let samples = self.problem.samples;
+        let parameters = at.weights.len() * self.problem.kinds.len() + self.problem.layout.len();
+        let (mut rows, mut residuals, mut cost) = (Vec::new(), Vec::new(), 0.0);
+        let parts = samples.map_pieces(
+            || (Vec::new(), Vec::new(), 0.0, Scratch::default()),
+            |(rows, residuals, cost, scratch), block| {
+                *cost += self.rows(at, block, scratch, rows, residuals, parameters);
+            },
+        );
+        for (part, r, c, _) in parts {
+            rows.extend(part);
+            residuals.extend(r);
+            cost += c;
+        }
+        let jacobian = DMatrix::from_row_iterator(residuals.len().max(parameters), parameters, {
+            let missing = residuals.len().max(parameters) * parameters - rows.len();
+            rows.into_iter().chain(std::iter::repeat_n(0.0, missing))
+        });
+        residuals.resize(jacobian.nrows(), 0.0);
+        Linearization { cost, ..Linearization::from_jacobian(&DVector::from_vec(residuals), jacobian) }
+    }
+
+    /// Appends the rows of a block, and returns its cost.
+    fn rows(
+        &self,
+        at: &Solution,
+        block: &Block,
+        scratch: &mut Scratch,
+        rows: &mut Vec<f64>,
+        residuals: &mut Vec<f64>,
+        parameters: usize,
+    ) -> f64 {
+        let mut cost = 0.0;
+        scratch.basis(block, &at.lobes);
+        for (c, x) in at.weights.iter().enumerate() {
+            cost += scratch.residuals(self.problem.samples, block, c, x, self.problem.saturation);
+            let (place, strength) = self.columns(at, c);
+            for (i, w) in block.weight(c).iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                let root = (w * scratch.trust.get(i).copied().unwrap_or(1.0)).sqrt();
+                let mut row = vec![0.0; parameters];
+                for (k, column) in scratch.columns.iter().enumerate() {
+                    row[place[k]] = root * scratch.slope[i] * strength[k] * column[i];
+                }
+                rows.extend(row);
+                residuals.push(root * scratch.r[i]);
+            }
+        }
+        cost
+    }
+}
+
+impl Linearize for Joint<'_> {
+    fn cost(&self, p: &DVector<f64>) -> Result<f64, Error> {
+        let at = self.solution(p, f64::NAN);
+        let sums = passes::sums(self.problem.samples, &at.lobes, &at.weights, self.problem.saturation, Want::Gradient);
+        Ok(sums.iter().map(|s| s.cost).sum())
+    }
+
+    fn linearize(&self, p: &DVector<f64>) -> Result<Linearization, Error> {
+        let at = self.solution(p, f64::NAN);
+        Ok(if self.dense { self.by_rows(&at) } else { self.by_normal(&at) })
+    }
+}

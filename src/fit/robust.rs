@@ -1,0 +1,109 @@
+//! Robust losses: the scale s and the parameters that go with it.
+//!
+//! s is a multiple of the residuals' own spread, which depends on the parameters, which depend on s. The way in is from above: the
+//! plain fit's spread is too large where outliers pull it; as they let go it shrinks, and the parameters follow.
+
+use super::joint::Digits;
+use super::options::{FitError, FitOptions};
+use super::part::{SMALL, descend};
+use super::passes::Scratch;
+use super::reduced::{Problem, Solution, Streamed};
+use super::start;
+
+/// Rounds in which s settles, and the relative change at which it has: of small tables and of others, where each round takes passes
+/// and the parameters' own errors are far larger.
+const ROUNDS: usize = 60;
+const SETTLED: f64 = 1e-12;
+const SETTLED_LARGE: f64 = 1e-7;
+/// Relative change from which on the parameters are followed to their last digits.
+const FINE: f64 = 1e-4;
+/// Most that s shrinks in a round: the parameters must be able to follow.
+const SHRINK: f64 = 0.25;
+
+/// The parameters at the s that their residuals ask for, starting from the plain loss's fit; sets the problem's s. `parts` are the
+/// same problem on thinned-out samples, for the search for other starts.
+pub(super) fn settle(
+    problem: &mut Problem<'_>,
+    parts: (Problem<'_>, Problem<'_>),
+    plain: Solution,
+    options: &FitOptions,
+) -> Result<Solution, FitError> {
+    let steps = options.max_iterations;
+    let scale = |problem: &Problem<'_>, at: &Solution| spread(problem, at) * options.robust.map_or(1.0, |r| r.scale);
+    let set = |problem: &mut Problem<'_>, s: f64| problem.saturation = options.robust.map(|r| (r.kind, s));
+    let mut s = scale(problem, &plain);
+    set(problem, s);
+    let (mut few, mut more) = parts;
+    (few.saturation, more.saturation) = (problem.saturation, problem.saturation);
+    // Outliers may have drawn the plain fit into another valley: the robust cost has the last word on where to go on.
+    let other = start::search_streamed(&few, &more, steps)?;
+    let other = Streamed::new(problem).solve(other.outcome.t.as_slice());
+    let (mut at, other) = (descend(problem, plain, steps, Digits::Rough)?.0, descend(problem, other, steps, Digits::Rough)?.0);
+    if other.cost < at.cost {
+        at = other;
+    }
+    // ln(new s) − ln(old s) is brought to 0 by secants, within the bracket that is known.
+    let (mut last, mut bracket): (Option<(f64, f64)>, (f64, f64)) = (None, (f64::NEG_INFINITY, f64::INFINITY));
+    let small = problem.samples.residuals() <= SMALL;
+    let settled = if small { SETTLED } else { SETTLED_LARGE };
+    for _ in 0..ROUNDS {
+        let (here, wanted) = (s.ln(), scale(problem, &at).ln());
+        let excess = wanted - here;
+        if excess.abs() <= settled {
+            break;
+        }
+        bracket = if excess > 0.0 { (bracket.0.max(here), bracket.1) } else { (bracket.0, bracket.1.min(here)) };
+        let secant = last.map(|(x, e): (f64, f64)| here - excess * (here - x) / (excess - e)).filter(|x| x.is_finite());
+        let mut next = secant.filter(|x| (x - here).abs() < 4.0 * excess.abs()).unwrap_or(wanted);
+        if next <= bracket.0 || next >= bracket.1 {
+            let inside = wanted > bracket.0 && wanted < bracket.1;
+            next = if inside { wanted } else { 0.5 * (bracket.0 + bracket.1) };
+        }
+        last = Some((here, excess));
+        s = next.max(here + SHRINK.ln()).exp();
+        set(problem, s);
+        let digits = if small && excess.abs() < FINE { Digits::All } else { Digits::Rough };
+        at = descend(problem, at, steps, digits)?.0;
+    }
+    Ok(at)
+}
+
+/// σ of the residuals by their median absolute deviation from their median; at least rounding's share of the data.
+fn spread(problem: &Problem<'_>, at: &Solution) -> f64 {
+    let samples = problem.samples;
+    let nothing: Vec<_> = at.weights.iter().map(|x| x * 0.0).collect();
+    let start = || (Vec::new(), 0.0f64, Scratch::default());
+    let pieces = samples.map_pieces(start, |(list, largest, scratch), block| {
+        scratch.basis(block, &at.lobes);
+        for (c, x) in at.weights.iter().enumerate() {
+            let counts = |(r, w): (&f64, &f64)| (*w > 0.0).then_some(*r);
+            scratch.residuals(samples, block, c, x, None);
+            list.extend(scratch.r.iter().zip(block.weight(c)).filter_map(counts));
+            scratch.residuals(samples, block, c, &nothing[c], None);
+            *largest = scratch.r.iter().zip(block.weight(c)).filter_map(counts).fold(*largest, |m, r| m.max(r.abs()));
+        }
+    });
+    let largest = pieces.iter().map(|p| p.1).fold(0.0, f64::max);
+    let mut r: Vec<f64> = pieces.into_iter().flat_map(|p| p.0).collect();
+    let centre = median(&mut r);
+    r.iter_mut().for_each(|r| *r = (*r - centre).abs());
+    (MAD_TO_SIGMA * median(&mut r)).max(ROUNDING * largest).max(SMALLEST)
+}
+
+/// Residuals below this share of the data are rounding, and no scale below this can be squared.
+const ROUNDING: f64 = 1e-13;
+const SMALLEST: f64 = 1e-140;
+
+/// σ of normal noise over its median absolute deviation.
+const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
+
+fn median(list: &mut [f64]) -> f64 {
+    if list.is_empty() {
+        return 0.0;
+    }
+    let middle = list.len() / 2;
+    let odd = list.len() % 2 == 1;
+    let (below, upper, _) = list.select_nth_unstable_by(middle, f64::total_cmp);
+    if odd { *upper } else { 0.5 * (*upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max)) }
+}
+
