@@ -84,6 +84,26 @@ fn noise_about_0_is_data_and_no_reflectance_is_made_of_it() {
     }
 }
 
+/// By stated σ, too, negative values are data: leaving them out would raise what is left.
+#[test]
+fn by_stated_sigma_negative_values_count_for_every_loss() {
+    let instrument = Instrument { electrons: 1e3, ..Instrument::default() };
+    let m = measure(&material(&[0.02], &[0.2], 20.0), &instrument, &HEMISPHERE(15.0), 3);
+    let negative = m.values.iter().filter(|v| **v < 0.0).count();
+    assert!(negative > 100, "{negative}");
+    let mut failures = Vec::new();
+    for loss in Loss::ALL {
+        let plain = solved(&m, &FitOptions { loss, ..options("lambert+phong") });
+        let got = solved(&m, &FitOptions { loss, use_sigma: true, ..options("lambert+phong") });
+        let case = format!("{}: {} of {} samples", loss.name(), record(&got).samples, record(&plain).samples);
+        println!("{case}, {negative} of {} negative, {:?}", m.len(), parameters(&got));
+        if record(&got).samples != record(&plain).samples {
+            failures.push(case);
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
 #[test]
 fn values_too_negative_for_the_logarithm_are_left_out_and_said_so() {
     let mut m = exact(&material(&[0.3], &[0.2], 10.0), &HEMISPHERE(15.0));

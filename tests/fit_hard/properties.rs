@@ -75,7 +75,8 @@ proptest! {
         loss in prop::sample::select(vec![Loss::L2, Loss::CosineL2, Loss::Relative]),
         use_sigma in any::<bool>(),
     ) {
-        let o = FitOptions { loss, use_sigma, ..options("lambert+phong") };
+        // By stated σ the relative loss has a test of its own, for what it does with negative values.
+        let o = FitOptions { loss, use_sigma: use_sigma && loss != Loss::Relative, ..options("lambert+phong") };
         let got = solved(&m, &o);
         let p = parameters(&got);
         let r = record(&got);
