@@ -77,7 +77,8 @@ fn intervals_hold_the_truth_at_every_noise_with_and_without_stated_sigma() {
 fn robust_intervals_hold_the_truth_under_5_percent_of_gross_outliers() {
     let cauchy =
         Cell { outliers: Outliers::OneSided(0.05), robust: Some(RobustKind::Cauchy), ..Cell::plain(small(), 1e5) };
-    let huber = Cell { outliers: Outliers::Symmetric(0.05), robust: Some(RobustKind::Huber), ..Cell::plain(small(), 1e5) };
+    let huber =
+        Cell { outliers: Outliers::Symmetric(0.05), robust: Some(RobustKind::Huber), ..Cell::plain(small(), 1e5) };
     hold(&[cauchy, huber], 50_000);
 }
 

@@ -52,8 +52,8 @@ impl Cell {
             true
         };
         let instrument = Instrument { electrons: self.electrons, ..Instrument::default() };
-        let mut m =
-            simulate("truth", &value, &material.channels, &instrument, &self.scan, seed, Control::silent()).expect("a scan");
+        let mut m = simulate("truth", &value, &material.channels, &instrument, &self.scan, seed, Control::silent())
+            .expect("a scan");
         add_outliers(&mut m, self.outliers, &mut stream(seed, Purpose::Study, 77));
         if !self.stated_sigma {
             m.sigma = None;

@@ -13,7 +13,10 @@ use crate::support::*;
 
 /// Every loss, plain and robust.
 fn all_options(model: &str) -> Vec<FitOptions> {
-    Loss::ALL.into_iter().flat_map(|loss| robusts().map(|robust| FitOptions { loss, robust, ..options(model) })).collect()
+    Loss::ALL
+        .into_iter()
+        .flat_map(|loss| robusts().map(|robust| FitOptions { loss, robust, ..options(model) }))
+        .collect()
 }
 
 fn named(o: &FitOptions) -> String {
@@ -49,7 +52,10 @@ fn all_masked_is_refused_with_the_counts() {
     for o in all_options("lambert+phong") {
         let error = fit(&m, &o).expect_err("nothing to fit");
         // θi and θo of 0, 10 … 80 degrees, 36 azimuths but for the pole: all lie within 80°.
-        let counts = matches!(error, FitError::NothingToFit { entries: 2601, below: 0, beyond: 0, masked: 2601, weightless: 0, .. });
+        let counts = matches!(
+            error,
+            FitError::NothingToFit { entries: 2601, below: 0, beyond: 0, masked: 2601, weightless: 0, .. }
+        );
         assert!(counts, "{}: {error:?}", named(&o));
         assert!(error.to_string().contains("2601 are masked"), "{error}");
     }
@@ -114,7 +120,11 @@ fn values_too_negative_for_the_logarithm_are_left_out_and_said_so() {
     let got = solved(&m, &FitOptions { loss: Loss::Log, ..options("lambert+phong") });
     let plain = record(&solved(&m, &options("lambert+phong"))).samples;
     assert_eq!(record(&got).samples, plain - 2);
-    assert!(record(&got).warnings.iter().any(|w| w.starts_with("2 values are too negative")), "{:?}", record(&got).warnings);
+    assert!(
+        record(&got).warnings.iter().any(|w| w.starts_with("2 values are too negative")),
+        "{:?}",
+        record(&got).warnings
+    );
 }
 
 /// A detector that saturates at a third of the peak: the plain fit says that the model does not describe the data, the peak masked gives the
@@ -172,7 +182,8 @@ fn cauchy_sees_through_5_percent_of_gross_outliers_on_one_side_or_both() {
             let m = with_outliers(outliers, seed);
             let off = |robust| worst(&solved(&m, &FitOptions { loss, robust, ..options("lambert+phong") }), &truth);
             let (plain, cauchy) = (off(None), off(robust(RobustKind::Cauchy)));
-            let case = format!("{} seed {seed} {outliers:?}: plain off by {plain:.1e}, cauchy by {cauchy:.1e}", loss.name());
+            let case =
+                format!("{} seed {seed} {outliers:?}: plain off by {plain:.1e}, cauchy by {cauchy:.1e}", loss.name());
             println!("{case}");
             if !(cauchy < 0.01) {
                 failures.push(case);
@@ -217,7 +228,8 @@ fn eight_decades_without_noise_come_back_by_every_loss() {
         let o = FitOptions { loss, ..options("lambert+phong") };
         let got = solved(&m, &o);
         let bound = f64::max(1e-9, 20.0 * crate::recovery::data_rounding(&m, &o, &parameters(&truth)));
-        let case = format!("{}: off by {:.1e} of {bound:.1e}, {}", loss.name(), worst(&got, &truth), record(&got).status);
+        let case =
+            format!("{}: off by {:.1e} of {bound:.1e}, {}", loss.name(), worst(&got, &truth), record(&got).status);
         println!("{case}");
         if !(worst(&got, &truth) <= bound) {
             failures.push(case);
@@ -292,7 +304,8 @@ fn some_samples_twice_count_as_twice_their_weight() {
     let m = measure(&material(&[0.3], &[0.2], 40.0), &Instrument::default(), &HEMISPHERE(15.0), 3);
     let repeated = entries(&m, &(0..m.len()).chain((0..m.len()).step_by(3)).collect::<Vec<_>>());
     let mut heavier = entries(&m, &(0..m.len()).collect::<Vec<_>>());
-    heavier.weights = Weights::SolidAngle((0..m.len()).map(|i| m.weights.get(i) * if i % 3 == 0 { 2.0 } else { 1.0 }).collect());
+    heavier.weights =
+        Weights::SolidAngle((0..m.len()).map(|i| m.weights.get(i) * if i % 3 == 0 { 2.0 } else { 1.0 }).collect());
     for loss in Loss::ALL {
         let o = FitOptions { loss, ..options("lambert+phong") };
         let (a, b) = (solved(&repeated, &o), solved(&heavier, &o));
@@ -333,7 +346,8 @@ fn one_nan_and_one_infinity_in_a_csv_file_are_masked_counted_and_do_no_harm() {
             100 => infinity.to_owned(),
             _ => m.values[i].to_string(),
         });
-        let table = formats::read_bytes(Path::new("hurt.csv"), bytes, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let table = formats::read_bytes(Path::new("hurt.csv"), bytes, &ReadOptions::default())
+            .unwrap_or_else(|e| panic!("{e}"));
         assert_eq!((table.masked.not_finite, table.masked.marked), (2, 0), "{:?}", table.masked);
         let place = table.masked.first_not_finite.as_deref().unwrap_or_default();
         // The header is line 1, entry 11 line 13.

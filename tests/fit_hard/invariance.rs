@@ -33,28 +33,26 @@ fn the_unit_of_the_data_does_not_change_the_shape() {
     let mut failures = Vec::new();
     for model in MODELS {
         let m = noisy(model);
-        for loss in HOMOGENEOUS {
-            for robust in robusts() {
-                let o = FitOptions { loss, robust, ..options(model) };
-                let plain = solved(&m, &o);
-                for scale in [1e-12, 1e12] {
-                    let mut scaled = copy(&m);
-                    scaled.values.iter_mut().for_each(|v| *v *= scale);
-                    scaled.sigma.iter_mut().flatten().for_each(|v| *v *= scale);
-                    let got = solved(&scaled, &o);
-                    let lobes = 1..got.lobes.len();
-                    let shape = lobes.clone().map(|l| rel(exponent(&got, l), exponent(&plain, l))).fold(0.0, f64::max);
-                    let pairs = parameters(&got).into_iter().zip(parameters(&plain)).take(3 * got.lobes.len());
-                    let weight = pairs.map(|(a, b)| if b == 0.0 { a } else { rel(a / scale, b) }).fold(0.0, f64::max);
-                    let case = format!(
-                        "{model} {} {:?} × {scale:e}: shape {shape:.1e}, weights {weight:.1e}",
-                        loss.name(),
-                        robust.map(|r| r.kind)
-                    );
-                    println!("{case}");
-                    if !(shape <= 1e-12 && weight <= 1e-11) {
-                        failures.push(case);
-                    }
+        for (loss, robust) in combinations(model, &HOMOGENEOUS) {
+            let o = FitOptions { loss, robust, ..options(model) };
+            let plain = solved(&m, &o);
+            for scale in [1e-12, 1e12] {
+                let mut scaled = copy(&m);
+                scaled.values.iter_mut().for_each(|v| *v *= scale);
+                scaled.sigma.iter_mut().flatten().for_each(|v| *v *= scale);
+                let got = solved(&scaled, &o);
+                let lobes = 1..got.lobes.len();
+                let shape = lobes.clone().map(|l| rel(exponent(&got, l), exponent(&plain, l))).fold(0.0, f64::max);
+                let pairs = parameters(&got).into_iter().zip(parameters(&plain)).take(3 * got.lobes.len());
+                let weight = pairs.map(|(a, b)| if b == 0.0 { a } else { rel(a / scale, b) }).fold(0.0, f64::max);
+                let case = format!(
+                    "{model} {} {:?} × {scale:e}: shape {shape:.1e}, weights {weight:.1e}",
+                    loss.name(),
+                    robust.map(|r| r.kind)
+                );
+                println!("{case}");
+                if !(shape <= 1e-12 && weight <= 1e-11) {
+                    failures.push(case);
                 }
             }
         }
@@ -81,16 +79,14 @@ fn the_order_of_the_samples_does_not_change_the_shape() {
     shuffled.weights = Weights::SolidAngle(order.iter().map(|i| m.weights.get(*i)).collect());
     let mut failures = Vec::new();
     for model in MODELS {
-        for loss in Loss::ALL {
-            for robust in robusts() {
-                let o = FitOptions { loss, robust, ..options(model) };
-                let (a, b) = (solved(&m, &o), solved(&shuffled, &o));
-                let off = (1..a.lobes.len()).map(|l| rel(exponent(&a, l), exponent(&b, l))).fold(0.0, f64::max);
-                let case = format!("{model} {} {:?}: {off:.1e}", loss.name(), robust.map(|r| r.kind));
-                println!("{case}");
-                if !(off <= 1e-12) {
-                    failures.push(case);
-                }
+        for (loss, robust) in combinations(model, &Loss::ALL) {
+            let o = FitOptions { loss, robust, ..options(model) };
+            let (a, b) = (solved(&m, &o), solved(&shuffled, &o));
+            let off = (1..a.lobes.len()).map(|l| rel(exponent(&a, l), exponent(&b, l))).fold(0.0, f64::max);
+            let case = format!("{model} {} {:?}: {off:.1e}", loss.name(), robust.map(|r| r.kind));
+            println!("{case}");
+            if !(off <= 1e-12) {
+                failures.push(case);
             }
         }
     }
@@ -101,19 +97,17 @@ fn the_order_of_the_samples_does_not_change_the_shape() {
 fn any_number_of_threads_gives_the_same_bits_for_every_loss() {
     let m = noisy(MODELS[1]);
     for model in MODELS {
-        for loss in Loss::ALL {
-            for robust in robusts() {
-                let o = FitOptions { loss, robust, ..options(model) };
-                let run = |threads: usize| {
-                    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-                    let mut got = pool.install(|| fit(&m, &o)).unwrap_or_else(|e| panic!("{e}")).material;
-                    got.fit.as_mut().expect("a record").seconds = 0.0;
-                    got.to_json().expect("json")
-                };
-                let one = run(1);
-                for threads in [2, 8] {
-                    assert_eq!(one, run(threads), "{model} {loss:?} {robust:?} {threads} threads");
-                }
+        for (loss, robust) in combinations(model, &Loss::ALL) {
+            let o = FitOptions { loss, robust, ..options(model) };
+            let run = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+                let mut got = pool.install(|| fit(&m, &o)).unwrap_or_else(|e| panic!("{e}")).material;
+                got.fit.as_mut().expect("a record").seconds = 0.0;
+                got.to_json().expect("json")
+            };
+            let one = run(1);
+            for threads in [2, 8] {
+                assert_eq!(one, run(threads), "{model} {loss:?} {robust:?} {threads} threads");
             }
         }
     }

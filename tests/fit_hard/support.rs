@@ -79,6 +79,21 @@ pub fn robusts() -> [Option<Robust>; 3] {
     [None, robust(RobustKind::Huber), robust(RobustKind::Cauchy)]
 }
 
+/// Losses with robust losses that meet each loss and each robust loss: all pairs for one glossy lobe, fewer for more, which take long.
+pub fn combinations(model: &str, losses: &[Loss]) -> Vec<(Loss, Option<Robust>)> {
+    let few = [
+        (Loss::L2, robust(RobustKind::Cauchy)),
+        (Loss::CosineL2, None),
+        (Loss::CosineL2, robust(RobustKind::Huber)),
+        (Loss::Log, None),
+        (Loss::CubeRoot, robust(RobustKind::Huber)),
+        (Loss::Relative, None),
+        (Loss::Relative, robust(RobustKind::Cauchy)),
+    ];
+    let all = losses.iter().flat_map(|loss| robusts().map(|robust| (*loss, robust)));
+    all.filter(|pair| model.matches("phong").count() < 2 || few.contains(pair)).collect()
+}
+
 pub const HOMOGENEOUS: [Loss; 4] = [Loss::L2, Loss::CosineL2, Loss::CubeRoot, Loss::Relative];
 
 pub fn fitted(m: &Measurement, o: &FitOptions) -> Fitted {
@@ -180,14 +195,16 @@ pub fn assert_finite(m: &Material) {
 /// once in 10¹⁴ fits). For an exponent, whose error is even on the logarithmic scale, upwards by the farther of the two scales.
 pub fn made_up(got: &Material, truth: &[f64], slack: f64) -> Option<String> {
     let weights = got.channels.len() * got.lobes.len();
-    let off = parameters(got).into_iter().zip(intervals(got)).zip(truth).enumerate().any(|(i, ((value, interval), truth))| {
-        interval.is_some_and(|(low, high)| {
-            let slack = slack * truth.abs();
-            let ratio = if i >= weights && value > 0.0 { value * (high / value).powi(4) } else { 0.0 };
-            let most = f64::max(value + 4.0 * (high - value), ratio);
-            *truth < value - 4.0 * (value - low) - slack || *truth > most + slack
-        })
-    });
+    let off = parameters(got).into_iter().zip(intervals(got)).zip(truth).enumerate().any(
+        |(i, ((value, interval), truth))| {
+            interval.is_some_and(|(low, high)| {
+                let slack = slack * truth.abs();
+                let ratio = if i >= weights && value > 0.0 { value * (high / value).powi(4) } else { 0.0 };
+                let most = f64::max(value + 4.0 * (high - value), ratio);
+                *truth < value - 4.0 * (value - low) - slack || *truth > most + slack
+            })
+        },
+    );
     off.then(|| format!("{:?} in {:?}, true {truth:?}", parameters(got), intervals(got)))
 }
 
