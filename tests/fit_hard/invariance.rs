@@ -14,7 +14,7 @@ fn noisy(model: &str) -> Measurement {
     let glossy = [(three(0.2), 12.0), (three(0.3), 300.0)];
     let lobes = glossy.into_iter().take(model.matches("phong").count()).map(|(w, n)| (LobeKind::Phong, w, vec![n]));
     let all = std::iter::once((LobeKind::Lambert, three(0.3), vec![])).chain(lobes).collect();
-    let scan = part_of(&HEMISPHERE(10.0), |_, wo| wo.y >= 0.0);
+    let scan = part_of(&HEMISPHERE(15.0), |_, wo| wo.y >= 0.0);
     measure(&Material::new(channels(3), all), &Instrument { electrons: 1e5, ..Instrument::default() }, &scan, 3)
 }
 
