@@ -332,7 +332,10 @@ fn csv(m: &Measurement, cell: impl Fn(usize) -> String) -> Vec<u8> {
         let (wi, wo) = m.directions.pair(i);
         let angles = |w: glam::DVec3| (w.truncate().length().atan2(w.z).to_degrees(), w.y.atan2(w.x).to_degrees());
         let ((ti, pi), (to, po)) = (angles(wi), angles(wo));
-        text.push_str(&format!("{ti},{pi},{to},{po},{}\n", cell(i)));
+        text.push_str(&[ti, pi, to, po].map(|a| a.to_string()).join(","));
+        text.push(',');
+        text.push_str(&cell(i));
+        text.push('\n');
     }
     text.into_bytes()
 }

@@ -5,7 +5,7 @@ use goniofit::control::Control;
 use goniofit::fit::{FitOptions, Fitted, Loss, Robust, RobustKind, fit};
 use goniofit::gonio::{Instrument, Scan, simulate};
 use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
-use goniofit::numeric::random::{Purpose, RngExt, Stream, stream};
+use goniofit::numeric::random::{Purpose, Stream, stream};
 use rand_distr::{Distribution, StandardNormal};
 
 pub fn channels(count: usize) -> Vec<String> {
@@ -70,6 +70,7 @@ pub fn options(model: &str) -> FitOptions {
     FitOptions::new(model.parse().expect("a model"))
 }
 
+#[allow(clippy::unnecessary_wraps)] // as the option wants it
 pub fn robust(kind: RobustKind) -> Option<Robust> {
     Some(Robust { kind, scale: kind.default_scale() })
 }
@@ -223,8 +224,4 @@ pub fn draws(index: u64) -> Stream {
 
 pub fn normal(rng: &mut Stream) -> f64 {
     StandardNormal.sample(rng)
-}
-
-pub fn uniform(rng: &mut Stream, low: f64, high: f64) -> f64 {
-    low + (high - low) * rng.random::<f64>()
 }
