@@ -1,0 +1,120 @@
+//! Intervals hold the truth as often as they say, by small numbers of experiments; `benches/coverage.rs` does it by large ones. Where the model
+//! can't be right, on real tapes that send light back to where it came from, the record says so.
+
+use std::path::Path;
+
+use goniofit::fit::RobustKind;
+use goniofit::gonio::Scan;
+use goniofit::measurement::formats::{self, ReadOptions};
+use rayon::prelude::*;
+
+use crate::experiment::{Cell, Outliers};
+use crate::support::*;
+
+const SEEDS: u64 = 200;
+/// kd, ks, n of the plain cells and the robust ones.
+const FIGURES: usize = 3 * 8;
+
+fn small() -> Scan {
+    Scan::InPlane { step_deg: 5.0 }
+}
+
+/// The counts between which a binomial of `SEEDS` trials of 95 % lies but for a chance of `tail` at each end: the least k with P(X ≤ k) > tail
+/// and the largest with P(X ≥ k) > tail. Tests of right intervals over all `FIGURES` fail by chance with 10⁻³ in all when
+/// tail = 10⁻³/(2·`FIGURES`), by the union bound.
+fn bounds() -> (u64, u64) {
+    let tail = 1e-3 / (2 * FIGURES) as f64;
+    let (n, p) = (SEEDS as f64, 0.95f64);
+    // P(X = 0), then each from the one before.
+    let mut probability = vec![(1.0 - p).powf(n)];
+    for k in 1..=SEEDS {
+        let last = probability[k as usize - 1];
+        probability.push(last * (n - k as f64 + 1.0) / k as f64 * p / (1.0 - p));
+    }
+    let least = (0..=SEEDS).find(|k| probability[..=*k as usize].iter().sum::<f64>() > tail).expect("they add up to 1");
+    let most = (0..=SEEDS).rfind(|k| probability[*k as usize..].iter().sum::<f64>() > tail).expect("they add up to 1");
+    (least, most)
+}
+
+/// The cells, each with seeds of its own.
+fn hold(cells: &[Cell], first_seed: u64) {
+    let (least, most) = bounds();
+    let mut failures = Vec::new();
+    for (i, cell) in cells.iter().enumerate() {
+        let seeds = first_seed + 1000 * i as u64..first_seed + 1000 * i as u64 + SEEDS;
+        let all: Vec<[bool; 3]> = seeds.into_par_iter().map(|seed| cell.held([0.3, 0.2, 40.0], seed)).collect();
+        let held: [u64; 3] = std::array::from_fn(|p| all.iter().filter(|h| h[p]).count() as u64);
+        println!("{cell:?}: {held:?} of {SEEDS}, expected {least} to {most}");
+        if !held.iter().all(|h| (least..=most).contains(h)) {
+            failures.push(format!("{cell:?}: {held:?} of {SEEDS}"));
+        }
+    }
+    assert!(failures.is_empty(), "expected {least} to {most}:\n{}", failures.join("\n"));
+}
+
+#[test]
+fn the_bounds_are_those_of_the_binomial() {
+    let (least, most) = bounds();
+    // Mean 190, standard deviation 3.08: about four of them on the long side, all of it on the other.
+    assert!((175..=178).contains(&least) && most == 200, "{least} {most}");
+}
+
+#[test]
+fn intervals_hold_the_truth_at_every_noise_with_and_without_stated_sigma() {
+    let mut cells = Vec::new();
+    for electrons in [1e4, 1e6] {
+        for stated_sigma in [true, false] {
+            cells.push(Cell { stated_sigma, ..Cell::plain(small(), electrons) });
+        }
+    }
+    cells.push(Cell::plain(HEMISPHERE(15.0), 1e5));
+    cells.push(Cell { stated_sigma: false, ..Cell::plain(HEMISPHERE(15.0), 1e5) });
+    hold(&cells, 10_000);
+}
+
+/// One-sided outliers pull a Cauchy fit by a hundredth of a sample's noise, a tenth of the standard error with so small a scan.
+#[test]
+fn robust_intervals_hold_the_truth_under_5_percent_of_gross_outliers() {
+    let cauchy =
+        Cell { outliers: Outliers::OneSided(0.05), robust: Some(RobustKind::Cauchy), ..Cell::plain(small(), 1e5) };
+    let huber =
+        Cell { outliers: Outliers::Symmetric(0.05), robust: Some(RobustKind::Huber), ..Cell::plain(small(), 1e5) };
+    hold(&[cauchy, huber], 50_000);
+}
+
+fn a_real_tape_is_no_phong_lobe(file: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/measured").join(file);
+    if !path.exists() {
+        println!("SKIPPED: {file} is not here");
+        return;
+    }
+    let m = formats::read(&path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    for model in ["lambert+phong", "lambert+phong+phong"] {
+        let got = solved(&m, &options(model));
+        let r = record(&got);
+        let residual = r.residual.as_ref().expect("neighbours to compare");
+        println!("{file} {model}: {:?} {residual:?} {:?}", parameters(&got), r.warnings);
+        assert_eq!(residual.noise_from, "neighbours");
+        assert!(residual.structured_share > 0.5, "{residual:?}");
+        assert!(residual.effective_samples < 0.5 * r.samples as f64, "{residual:?}");
+        assert!(r.warnings.iter().any(|w| w.starts_with("the model does not describe these data")), "{:?}", r.warnings);
+        assert_eq!(r.model_error.len(), got.lobes.len());
+        for (own, (error, lobe)) in r.model_error.iter().zip(r.standard_error.iter().zip(&got.lobes)) {
+            let pairs = own.weight.iter().zip(&error.weight).zip(&lobe.weight);
+            for ((model, noise), weight) in pairs.filter(|((_, noise), w)| noise.is_some() && **w > 0.0) {
+                // The model's own error moves a parameter further than noise does.
+                assert!(model >= noise, "weight {weight}: {model:?} {noise:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_real_yellow_tape_is_said_not_to_be_a_phong_lobe() {
+    a_real_tape_is_no_phong_lobe("retro-3M-yellow.alta.dat");
+}
+
+#[test]
+fn a_real_grey_tape_is_said_not_to_be_a_phong_lobe() {
+    a_real_tape_is_no_phong_lobe("retro-gray-tape.alta.dat");
+}
