@@ -27,6 +27,7 @@ const OUTPUT: &str = "Output";
   goniofit fit lab.csv --use-sigma --robust cauchy
   goniofit fit gold.binary --fix phong.exponent=50 --bound lambert.weight=0..0.3
   goniofit fit gold.binary --target-rmse-excess 1%")]
+#[allow(clippy::struct_excessive_bools)] // each is an option of its own
 pub(super) struct Args {
     /// Measurements; `-` is stdin
     #[arg(required = true)]

@@ -1,5 +1,7 @@
 //! Which model? Candidates compared by the error on directions that they were not fitted to.
 
+use std::fmt::Write;
+
 use super::limits::{Limit, Ranges};
 use super::options::{FitError, FitOptions};
 use super::part;
@@ -183,7 +185,7 @@ fn choose(tried: &[Tried]) -> ModelChoice {
         )
     };
     if let Some(next) = next {
-        reason += &format!("; the best simpler model's is {:.1} % higher", 100.0 * (next / own - 1.0));
+        let _ = write!(reason, "; the best simpler model's is {:.1} % higher", 100.0 * (next / own - 1.0));
     }
     ModelChoice { chosen: chosen.candidate.model.clone(), reason, candidates }
 }

@@ -40,11 +40,11 @@ pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncerta
         let (value, (low, high)) = parameter(problem, at, i);
         let reach = uncertainty.quantile * error;
         let near_end = i < weights && (value - low < 1.5 * reach || high - value < 1.5 * reach);
-        if low == high || !(near_end && problem.layout.len() > 0 || i >= weights && reach > NARROW) {
+        if low == high || !(near_end && !problem.layout.is_empty() || i >= weights && reach > NARROW) {
             continue;
         }
         let rise = reach * reach / uncertainty.bread[(i, i)];
-        if !(rise > RESOLVED * energy) {
+        if rise.is_nan() || rise <= RESOLVED * energy {
             continue;
         }
         let profile = Profile { search, at, parameter: i, rise };

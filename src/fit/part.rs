@@ -107,8 +107,7 @@ pub(super) fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Par
     if solution.cost < LOST_COST * energy || condition(search, &solution) > LOST_CONDITION {
         solution = polish(search, solution);
         if search.problem.samples.residuals() <= SMALL {
-            let start = solution.clone();
-            let (polished, _) = descend(search.problem, start, options.max_iterations, Digits::All)?;
+            let (polished, _) = descend(search.problem, &solution, options.max_iterations, Digits::All)?;
             if polished.cost <= solution.cost {
                 solution = polished;
             }
@@ -160,7 +159,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
         solution = robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
         found.report = start::SearchReport::default();
     }
-    let (solution, outcome) = descend(&problem, solution, options.max_iterations, Digits::All)?;
+    let (solution, outcome) = descend(&problem, &solution, options.max_iterations, Digits::All)?;
     found.outcome = outcome;
     let mut uncertainty = covariance::uncertainty(&problem, &solution, None);
     let mut part = problem.on(more.samples);
@@ -174,12 +173,12 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
 /// The minimum next to a solution, on all samples, to its last digits or roughly.
 pub(super) fn descend(
     problem: &Problem<'_>,
-    start: Solution,
+    start: &Solution,
     steps: u64,
     digits: Digits,
 ) -> Result<(Solution, solver::Outcome), FitError> {
     let failed = |e: argmin::core::Error| FitError::Solver { reason: e.to_string() };
-    if let Some(found) = joint::polish(problem, &start, steps, digits) {
+    if let Some(found) = joint::polish(problem, start, steps, digits) {
         let (solution, mut outcome) = found.map_err(failed)?;
         // The history is of the shapes.
         let weights = outcome.t.len() - problem.layout.len();

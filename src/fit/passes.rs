@@ -217,7 +217,7 @@ impl<'a, const K: usize> Kernel for Tally<'a, K> {
         let chunks = |list: &'a [f64]| list[..n].as_chunks::<LANES>();
         let (pull, pull_rest) = chunks(self.pull);
         let (weight, weight_rest) = chunks(self.weight);
-        let mut columns = [(&pull[..], &pull_rest[..]); K];
+        let mut columns = [(pull, pull_rest); K];
         for a in 0..K {
             columns[a] = chunks(&self.columns[a]);
             columns[a].0 = &columns[a].0[..pull.len()];

@@ -292,13 +292,13 @@ impl Facts<'_> {
                 100.0 * subset.rmse_excess_95
             ));
         }
-        list.extend(self.structure_warning(record));
+        list.extend(Self::structure_warning(record));
         list.extend(record.energy.as_ref().and_then(|e| energy::warning(material, e)));
         list
     }
 
     /// Says in plain words that the model can't bend as the material does.
-    fn structure_warning(&self, record: &FitRecord) -> Option<String> {
+    fn structure_warning(record: &FitRecord) -> Option<String> {
         let residual = record.residual.as_ref().filter(|r| r.structured_share > STRUCTURED)?;
         Some(format!(
             "the model does not describe these data: {:.0} % of the residuals' variance is structure, not noise (model error {:.3e}, noise \

@@ -37,7 +37,7 @@ pub(super) fn settle(
     // Outliers may have drawn the plain fit into another valley: the robust cost has the last word on where to go on.
     let other = start::search_streamed(&few, &more, steps)?;
     let other = Streamed::new(&more).solve(other.outcome.t.as_slice());
-    let candidates = [plain, other].map(|start| descend(&more, start, steps, Digits::Rough));
+    let candidates = [plain, other].map(|start| descend(&more, &start, steps, Digits::Rough));
     let [plain, other] = candidates;
     let (plain, other) = (plain?.0, other?.0);
     let at = if other.cost < plain.cost { other } else { plain };
@@ -80,7 +80,7 @@ fn follow(
         s = next.max(here + SHRINK.ln()).exp();
         problem.saturation = Some((robust.kind, s));
         let digits = if settled <= SETTLED { Digits::All } else { Digits::Rough };
-        at = descend(problem, at, steps, digits)?.0;
+        at = descend(problem, &at, steps, digits)?.0;
     }
     Ok(at)
 }

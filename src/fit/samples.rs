@@ -250,7 +250,7 @@ impl<'a> Samples<'a> {
         };
         let mut transforms = None;
         if let Some(lines) = samples.lines(options, solid_angle).filter(|_| thin.step == 1) {
-            transforms = samples.fold(&lines)?;
+            transforms = samples.fold(&lines);
             samples.source = Source::Merl(lines);
         } else {
             let kind = model.lobes().iter().copied().find(|k| !k.lobe().parameters().is_empty());
@@ -265,17 +265,17 @@ impl<'a> Samples<'a> {
 
     /// The quick way through a table: samples are counted and the transforms summed in one pass over the values. `None` where the channels
     /// have different masks, or the values are of a size that needs scaling first.
-    fn fold(&mut self, lines: &MerlLines) -> Result<Option<Transforms>, FitError> {
+    fn fold(&mut self, lines: &MerlLines) -> Option<Transforms> {
         match self.channels.len() {
             1 => self.fold_channels::<1>(lines),
             3 => self.fold_channels::<3>(lines),
-            _ => Ok(None),
+            _ => None,
         }
     }
 
-    fn fold_channels<const M: usize>(&mut self, lines: &MerlLines) -> Result<Option<Transforms>, FitError> {
+    fn fold_channels<const M: usize>(&mut self, lines: &MerlLines) -> Option<Transforms> {
         if self.loss == Loss::Relative {
-            return Ok(None);
+            return None;
         }
         let planes: [&[f64]; M] = std::array::from_fn(|m| self.measurement.plane(self.channels[m]));
         let cosine = self.loss == Loss::CosineL2;
@@ -308,7 +308,7 @@ impl<'a> Samples<'a> {
         }
         let plain = seen.unlike == 0.0 && seen.count > 0.0;
         if !plain || !(LEAST_UNSCALED..1.0 / LEAST_UNSCALED).contains(&seen.largest) {
-            return Ok(None);
+            return None;
         }
         self.count = seen.count as usize;
         self.counts = vec![self.count; M];
@@ -319,7 +319,7 @@ impl<'a> Samples<'a> {
         let mut factors = vec![factor * unit; 1 + M];
         factors[0] = factor;
         total.scale(&factors);
-        Ok(Some((total, seen.energy.map(|e| e * factor * unit * unit).to_vec())))
+        Some((total, seen.energy.map(|e| e * factor * unit * unit).to_vec()))
     }
 
     /// A MERL table needs no lists where every sample counts and its weight is plain.
@@ -741,7 +741,7 @@ impl Thin {
 /// Which of the `step` entries of run `run` a thinned-out list keeps: spread evenly, without a beat with the grid's own period.
 pub(super) fn offset(run: usize, step: usize) -> usize {
     let golden = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-    (golden * step as u64 >> 32) as usize
+    ((golden * step as u64) >> 32) as usize
 }
 
 /// Entries left out, by reason.

@@ -157,7 +157,7 @@ pub(super) fn search_streamed(few: &Problem<'_>, more: &Problem<'_>, steps: u64)
         best
     };
     let lattice = starts.len();
-    let run = |start: &Vec<f64>| polish_start(&Streamed::rough(more), more, start.clone(), steps);
+    let run = |start: &Vec<f64>| polish_start(Streamed::rough(more), more, start.clone(), steps);
     let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
     best_of(outcomes, lattice)
 }

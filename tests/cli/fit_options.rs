@@ -2,6 +2,8 @@
 
 use serde_json::{Value, json};
 
+use std::fmt::Write as _;
+
 use crate::bench::{Bench, csv, fixture, keys, number};
 
 #[test]
@@ -109,7 +111,7 @@ fn stated_sigmas_weigh_by_their_inverse_square() {
     let mut text = String::from("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,sigma_r\n");
     let (mut above, mut below) = (0.0, 0.0);
     for (theta_o, value, sigma) in [(10.0, 0.10, 0.01), (20.0, 0.14, 0.02), (30.0, 0.20, 0.04)] {
-        text += &format!("30,180,{theta_o},0,{value},{sigma}\n");
+        writeln!(text, "30,180,{theta_o},0,{value},{sigma}").expect("writes");
         above += value / (sigma * sigma);
         below += 1.0 / (sigma * sigma);
     }
