@@ -60,6 +60,14 @@ fn mark(
         t[i] = end;
         cost(&held, t) <= least + rise
     };
+    // A lobe whose weights may all be 0 may stand anywhere.
+    let unproved = |lobe: usize| {
+        let may_be_0 = |c: usize| {
+            let error = uncertainty.errors[c * lobes + lobe].unwrap_or(f64::INFINITY);
+            problem.ranges[c][lobe].0 == 0.0 && at.weights[c][lobe] <= uncertainty.quantile * error
+        };
+        (0..channels).all(may_be_0)
+    };
     let diffuse = problem.kinds.iter().position(|k| k.lobe().parameters().is_empty());
     let mut open = Vec::new();
     for (i, (lobe, parameter)) in problem.layout.iter().enumerate() {
@@ -69,14 +77,14 @@ fn mark(
             && low < high
             && low <= parameter.bounds.0.ln()
             && uncertainty.dark.contains(&false)
-            && as_good(i, low)
+            && (unproved(*lobe) || as_good(i, low))
         {
             let free = |c: usize, l: usize| problem.ranges[c][l].0 < problem.ranges[c][l].1;
             for c in (0..channels).filter(|&c| !uncertainty.dark[c] && free(c, diffuse) && free(c, *lobe)) {
                 open.extend([c * lobes + diffuse, c * lobes + lobe, shape]);
             }
         }
-        if low < high && problem.is_invisible(*lobe, high) && as_good(i, high) {
+        if low < high && problem.is_invisible(*lobe, high) && (unproved(*lobe) || as_good(i, high)) {
             open.push(shape);
             open.extend((0..channels).map(|c| c * lobes + lobe));
         }

@@ -105,13 +105,7 @@ pub(super) fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Par
     let mut solution = search.solve(found.outcome.t.as_slice());
     let energy: f64 = search.energy.iter().sum();
     if solution.cost < LOST_COST * energy || condition(search, &solution) > LOST_CONDITION {
-        solution = polish(search, solution);
-        if search.problem.samples.residuals() <= SMALL {
-            let (polished, _) = descend(search.problem, &solution, options.max_iterations, Digits::All)?;
-            if polished.cost <= solution.cost {
-                solution = polished;
-            }
-        }
+        solution = last_digits(search, solution, options)?;
     }
     let moments = search.moments(&solution.lobes, true);
     let mut uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments));
@@ -119,6 +113,29 @@ pub(super) fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Par
     solution.cost = uncertainty.cost;
     let intervals = intervals::profiled(search, &solution, &uncertainty);
     finish(search.problem, solution, uncertainty, intervals, found)
+}
+
+/// What sums of products have lost, won back on true residuals.
+fn last_digits(search: &Search<'_>, found: Solution, options: &FitOptions) -> Result<Solution, FitError> {
+    let problem = search.problem;
+    let mut best = polish(search, found);
+    if problem.samples.residuals() > SMALL {
+        return Ok(best);
+    }
+    if let [(low, high)] = problem.bounds[..] {
+        // A sharp lobe's tail may be too small for the sums: what it says of the exponent only true residuals see.
+        for t in start::octaves(low, high) {
+            let mut held = problem.on(problem.samples);
+            held.bounds = vec![(t, t)];
+            let tried = polish(&search.of(&held), search.of(&held).solve(&[t]));
+            if tried.cost < 0.5 * best.cost {
+                best = tried;
+            }
+        }
+    }
+    let (polished, _) = descend(problem, &best, options.max_iterations, Digits::All)?;
+    // Where rounding is all that is left the cost no longer tells; the descent ends at the shortest step.
+    Ok(if polished.cost <= 4.0 * best.cost { polished } else { best })
 }
 
 /// Largest condition number of the weights' Gram matrices, columns scaled to 1.

@@ -55,13 +55,15 @@ struct Nodes {
     alike: bool,
 }
 
+/// t from `low` to `high`, shapes an octave apart.
+pub(super) fn octaves(low: f64, high: f64) -> Vec<f64> {
+    let count = ((high - low) / std::f64::consts::LN_2 + 1e-9).floor() as usize;
+    (0..=count).map(|k| low + k as f64 * std::f64::consts::LN_2).collect()
+}
+
 impl Nodes {
     fn new(problem: &Problem<'_>) -> Self {
-        let octaves = |(low, high): (f64, f64)| {
-            let count = ((high - low) / std::f64::consts::LN_2 + 1e-9).floor() as usize;
-            (0..=count).map(|k| low + k as f64 * std::f64::consts::LN_2).collect::<Vec<f64>>()
-        };
-        let lists: Vec<Vec<f64>> = problem.bounds.iter().map(|b| octaves(*b)).collect();
+        let lists: Vec<Vec<f64>> = problem.bounds.iter().map(|(low, high)| octaves(*low, *high)).collect();
         let mut t: Vec<f64> = lists.iter().flatten().copied().collect();
         t.sort_by(f64::total_cmp);
         t.dedup();

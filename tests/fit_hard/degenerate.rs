@@ -43,7 +43,8 @@ fn a_lobe_of_exponent_0_seen_from_its_bright_side_alone_is_told_from_the_diffuse
                 let f = got.value(wi, wo)[0];
                 let (open, e) = (undetermined(&got), errors(&got));
                 println!("n {n:e} {scan} {electrons:e}: sum {f:e} {:?} {e:?} {open:?}", parameters(&got));
-                let slack = if electrons == 0.0 { 1e-7 } else { 0.01 };
+                // The search ends at n = 0.01, which bends a truth of 1e-6 by that much.
+                let slack = if electrons == 0.0 { 1e-6 } else { 0.01 };
                 assert!((f * std::f64::consts::PI / 0.5 - 1.0).abs() < slack, "{f} {got:?}");
                 for name in ["lambert.weight[r]", "phong.weight[r]"] {
                     assert!(

@@ -200,11 +200,17 @@ fn value(m: &Measurement, o: &FitOptions, channel: usize, entry: usize) -> Optio
             Loss::CosineL2 => c,
             Loss::Log => c / (1.0 + c * y),
             Loss::CubeRoot => c.cbrt() / (3.0 * y.cbrt().powi(2)),
-            Loss::Relative => 1.0 / y.abs(),
+            Loss::Relative => 1.0 / (y.abs() + plain_epsilon(m, channel)),
         };
         w = (to * sigma).powi(-2);
     }
     (w > 0.0).then(|| Value { entry, channel, cos_i: wi.z, cos_alpha: cos_alpha(wi, wo), y, w })
+}
+
+/// ε of the relative loss if every valid value counted for one: weights by σ can't wait for weights.
+fn plain_epsilon(m: &Measurement, channel: usize) -> f64 {
+    let known: Vec<f64> = m.plane(channel).iter().copied().filter(|v| !v.is_nan()).collect();
+    1e-3 * known.iter().map(|v| v.abs()).sum::<f64>() / known.len() as f64
 }
 
 /// (n + 2)/(2π) cosⁿα, 0 where cosα ≤ 0.
