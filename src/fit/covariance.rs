@@ -8,7 +8,7 @@ use super::passes::{Moments, Projected, Scratch};
 use super::reduced::{Problem, Solution};
 use super::samples::Block;
 use super::structure::Neighbours;
-use crate::numeric::simd::{Kernel, dot, vectorised};
+use crate::numeric::simd::{Kernel, dot_vectorised, vectorised};
 use crate::numeric::stats::student_quantile;
 
 /// A 95 % interval.
@@ -261,24 +261,13 @@ impl Part {
             }
             for (score, cluster) in scores.iter_mut().zip(&clusters) {
                 for (i, column) in scratch.columns.iter().enumerate() {
-                    let sum = vectorised(Dot(&scratch.pull[cluster.clone()], &column[cluster.clone()]));
+                    let sum = dot_vectorised(&scratch.pull[cluster.clone()], &column[cluster.clone()]);
                     score[place[i]] += strength[i] * sum;
                 }
             }
         }
         scores.iter().for_each(|s| self.clusters.ger(1.0, s, s, 1.0));
         self.count += clusters.len();
-    }
-}
-
-struct Dot<'a>(&'a [f64], &'a [f64]);
-
-impl Kernel for Dot<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        dot(self.0, self.1)
     }
 }
 

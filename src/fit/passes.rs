@@ -7,7 +7,7 @@ use super::loss::{Loss, RobustKind};
 use super::samples::{Block, Samples, Transforms};
 use super::transform::Transform;
 use crate::brdf::LobeKind;
-use crate::numeric::simd::{Kernel, dot, dot3, vectorised};
+use crate::numeric::simd::{Kernel, dot, dot_vectorised, dot3, vectorised};
 
 /// A lobe of the model at given shapes (natural units).
 #[derive(Debug, Clone)]
@@ -298,7 +298,7 @@ pub(super) fn transform(samples: &Samples<'_>) -> Transforms {
             for c in 0..channels {
                 let weight = &values[if lists == 1 { 0 } else { c }];
                 let wy: Vec<f64> = weight.iter().zip(&block.y[c]).map(|(w, y)| w * y).collect();
-                sums.1[c] += vectorised(Dot(&wy, &block.y[c]));
+                sums.1[c] += dot_vectorised(&wy, &block.y[c]);
                 values.push(wy);
             }
             sums.0.absorb(&block.x, &values);
@@ -310,17 +310,6 @@ pub(super) fn transform(samples: &Samples<'_>) -> Transforms {
         total.1.iter_mut().zip(energy).for_each(|(t, e)| *t += e);
     }
     total
-}
-
-struct Dot<'a>(&'a [f64], &'a [f64]);
-
-impl Kernel for Dot<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        dot(self.0, self.1)
-    }
 }
 
 /// The quadratic model of one channel's cost about given weights and shapes, by [weights, t of every shape parameter]. The slopes are

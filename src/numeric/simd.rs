@@ -130,6 +130,23 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     lanes.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
 }
 
+/// [`dot`] on the widest vector unit there is.
+#[must_use]
+pub fn dot_vectorised(a: &[f64], b: &[f64]) -> f64 {
+    vectorised(Dot(a, b))
+}
+
+struct Dot<'a>(&'a [f64], &'a [f64]);
+
+impl Kernel for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        dot(self.0, self.1)
+    }
+}
+
 /// Σ a·b·c in fixed lanes.
 #[inline(always)]
 #[must_use]
