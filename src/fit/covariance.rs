@@ -100,8 +100,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         clusters += &part.clusters;
         count += part.count;
         for (c, sums) in part.channels.iter().enumerate() {
-            let strength = strength(problem, &at.weights[c]);
-            let place = place(problem, channels, c);
+            let strength = problem.strength(&at.weights[c]);
+            let place = problem.place(channels, c);
             for (i, &a) in place.iter().enumerate() {
                 for (j, &b) in place.iter().enumerate() {
                     let both = strength[i] * strength[j];
@@ -121,7 +121,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     }
     if let Some(moments) = moments {
         for (c, x) in at.weights.iter().enumerate() {
-            let (strength, place) = (strength(problem, x), place(problem, channels, c));
+            let (strength, place) = (problem.strength(x), problem.place(channels, c));
             for (i, &a) in place.iter().enumerate() {
                 place.iter().enumerate().for_each(|(j, &b)| {
                     normal[(a, b)] += strength[i] * strength[j] * moments.gram(c)[(i, j)];
@@ -150,18 +150,6 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         stated,
         quantile: student_quantile(0.975, freedom.max(1.0)),
     }
-}
-
-/// What the bare columns of a channel are multiplied by: 1 for the lobes themselves, the lobe's weight for its slopes.
-fn strength(problem: &Problem<'_>, x: &DVector<f64>) -> Vec<f64> {
-    std::iter::repeat_n(1.0, x.len()).chain(problem.layout.iter().map(|(lobe, _)| x[*lobe])).collect()
-}
-
-/// Where a channel's columns stand among all parameters.
-fn place(problem: &Problem<'_>, channels: usize, channel: usize) -> Vec<usize> {
-    let lobes = problem.kinds.len();
-    let shapes = channels * lobes..channels * lobes + problem.layout.len();
-    (channel * lobes..(channel + 1) * lobes).chain(shapes).collect()
 }
 
 /// Which parameters are held at a value.
@@ -254,7 +242,7 @@ impl Part {
                 sums.dark |= vectorised(Dark(&block.x, other.weight(c))) > 0.0;
             }
             let gradient = sums.add(problem, block, c, scratch, bread);
-            let (strength, place) = (strength(problem, x), place(problem, channels, c));
+            let (strength, place) = (problem.strength(x), problem.place(channels, c));
             if clusters.len() == 1 {
                 place.iter().enumerate().for_each(|(i, p)| scores[0][*p] += strength[i] * gradient[i]);
                 continue;

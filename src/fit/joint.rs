@@ -67,21 +67,12 @@ impl Joint<'_> {
         Solution { lobes: self.problem.shaped(&t), t, weights, cost }
     }
 
-    /// Where a channel's columns stand among all parameters, and what its bare ones are multiplied by.
-    fn columns(&self, at: &Solution, channel: usize) -> (Vec<usize>, Vec<f64>) {
-        let (channels, lobes) = (at.weights.len(), self.problem.kinds.len());
-        let shapes = channels * lobes..channels * lobes + self.problem.layout.len();
-        let place = (channel * lobes..(channel + 1) * lobes).chain(shapes).collect();
-        let slopes = self.problem.layout.iter().map(|(lobe, _)| at.weights[channel][*lobe]);
-        (place, std::iter::repeat_n(1.0, lobes).chain(slopes).collect())
-    }
-
     fn by_normal(&self, at: &Solution) -> Linearization {
         let parameters = at.weights.len() * self.problem.kinds.len() + self.problem.layout.len();
         let sums = passes::sums(self.problem.samples, &at.lobes, &at.weights, self.problem.saturation, Want::All);
         let (mut normal, mut gradient) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
         for (c, sums) in sums.iter().enumerate() {
-            let (place, strength) = self.columns(at, c);
+            let (place, strength) = (self.problem.place(at.weights.len(), c), self.problem.strength(&at.weights[c]));
             for (i, &a) in place.iter().enumerate() {
                 gradient[a] += strength[i] * sums.gradient[i];
                 place
@@ -132,7 +123,7 @@ impl Joint<'_> {
         scratch.basis(block, &at.lobes);
         for (c, x) in at.weights.iter().enumerate() {
             cost += scratch.residuals(self.problem.samples, block, c, x, self.problem.saturation);
-            let (place, strength) = self.columns(at, c);
+            let (place, strength) = (self.problem.place(at.weights.len(), c), self.problem.strength(&at.weights[c]));
             for (i, w) in block.weight(c).iter().enumerate().filter(|(_, w)| **w > 0.0) {
                 let root = (w * scratch.trust.get(i).copied().unwrap_or(1.0)).sqrt();
                 let mut row = vec![0.0; parameters];

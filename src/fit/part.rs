@@ -10,6 +10,7 @@ use super::joint::{self, Digits};
 use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
 use super::passes::{self, Saturation};
+use super::quadratic;
 use super::reduced::{Problem, Search, Solution, Streamed, polish};
 use super::robust;
 use super::samples::{self, Samples, Transforms};
@@ -85,22 +86,19 @@ pub(super) fn refit(
 ) -> Result<Solution, FitError> {
     let mut problem = Problem::new(samples, model, ranges, options.conserve_energy);
     problem.saturation = like.saturation;
-    let start = DVector::from_column_slice(&like.solution.t);
-    let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
-    let failed = |e: argmin::core::Error| FitError::Solver { reason: e.to_string() };
     if problem.is_transformable() {
         let (transform, energy) = passes::transform(samples);
         let search = Search::new(&problem, &transform, &energy);
+        let start = DVector::from_column_slice(&like.solution.t);
+        let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
         let found = solver::minimize(&search, lm, start, options.max_iterations).map_err(failed)?;
         return Ok(search.solve(found.t.as_slice()));
     }
-    let streamed = Streamed::from(&problem, like.solution.clone());
-    let found = solver::minimize(&streamed, lm, start, options.max_iterations).map_err(failed)?;
-    Ok(streamed.solve(found.t.as_slice()))
+    Ok(descend_shapes(&problem, &like.solution, options.max_iterations)?.0)
 }
 
 /// A loss that is linear in the weights, without outliers: everything from the transforms, last digits from true residuals.
-pub(super) fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Part, FitError> {
+fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Part, FitError> {
     let found = start::search(search, options.max_iterations)?;
     let mut solution = search.solve(found.outcome.t.as_slice());
     let energy: f64 = search.energy.iter().sum();
@@ -142,10 +140,7 @@ fn last_digits(search: &Search<'_>, found: Solution, options: &FitOptions) -> Re
 fn condition(search: &Search<'_>, at: &Solution) -> f64 {
     let moments = search.moments(&at.lobes, false);
     let of = |gram: &nalgebra::DMatrix<f64>| {
-        let scale = gram.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-        let n = scale.len();
-        let scaled = nalgebra::DMatrix::from_fn(n, n, |i, j| gram[(i, j)] * scale[i] * scale[j]);
-        let eigen = scaled.symmetric_eigenvalues();
+        let eigen = quadratic::unit_columns(gram).0.symmetric_eigenvalues();
         if eigen.min() > 0.0 { eigen.max() / eigen.min() } else { f64::INFINITY }
     };
     moments.gram.iter().map(of).fold(1.0, f64::max)
@@ -194,7 +189,6 @@ pub(super) fn descend(
     steps: u64,
     digits: Digits,
 ) -> Result<(Solution, solver::Outcome), FitError> {
-    let failed = |e: argmin::core::Error| FitError::Solver { reason: e.to_string() };
     if let Some(found) = joint::polish(problem, start, steps, digits) {
         let (solution, mut outcome) = found.map_err(failed)?;
         // The history is of the shapes.
@@ -202,10 +196,24 @@ pub(super) fn descend(
         outcome.history.iter_mut().for_each(|step| drop(step.parameters.drain(..weights)));
         return Ok((solution, outcome));
     }
+    descend_shapes(problem, start, steps)
+}
+
+/// The minimum next to a solution by the shapes alone, the weights following.
+fn descend_shapes(
+    problem: &Problem<'_>,
+    start: &Solution,
+    steps: u64,
+) -> Result<(Solution, solver::Outcome), FitError> {
     let streamed = Streamed::from(problem, start.clone());
     let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
     let outcome = solver::minimize(&streamed, lm, DVector::from_column_slice(&start.t), steps).map_err(failed)?;
     Ok((streamed.solve(outcome.t.as_slice()), outcome))
+}
+
+#[allow(clippy::needless_pass_by_value)] // as map_err hands it over
+fn failed(error: argmin::core::Error) -> FitError {
+    FitError::Solver { reason: error.to_string() }
 }
 
 fn finish(

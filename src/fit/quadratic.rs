@@ -132,8 +132,7 @@ pub(super) fn solve_free(gram: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> 
     if b.is_empty() {
         return DVector::zeros(0);
     }
-    let scale = gram.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-    let scaled = DMatrix::from_fn(b.len(), b.len(), |i, j| gram[(i, j)] * scale[i] * scale[j]);
+    let (scaled, scale) = unit_columns(gram);
     let rhs = b.component_mul(&scale);
     if let Some(x) = cholesky(&scaled, &rhs) {
         return x.component_mul(&scale);
@@ -143,6 +142,13 @@ pub(super) fn solve_free(gram: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> 
     let inverse = eigen.eigenvalues.map(|l| if l > RANK * largest { 1.0 / l } else { 0.0 });
     let projected = (eigen.eigenvectors.transpose() * rhs).component_mul(&inverse);
     (eigen.eigenvectors * projected).component_mul(&scale)
+}
+
+/// A Gram matrix with its columns scaled to unit norm, and the scales; a column of zeros stays.
+pub(super) fn unit_columns(gram: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let scale = gram.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| gram[(i, j)] * scale[i] * scale[j]);
+    (scaled, scale)
 }
 
 /// The quick way, where no pivot of the scaled matrix says that it is nearly singular.

@@ -71,7 +71,6 @@ impl Facts<'_> {
         let unit = |p: &Part| self.options.loss.cost_unit(p.scale);
         let residuals: usize = self.parts.iter().flat_map(|p| &p.counts).sum();
         let cost: f64 = self.parts.iter().map(|p| p.solution.cost * unit(p)).sum();
-        let solid_angle = self.options.robust.is_some();
         let epsilon = |p: &Part| p.epsilon.iter().map(|e| e * p.scale).collect::<Vec<f64>>();
         let relative = self.options.loss == super::Loss::Relative;
         FitRecord {
@@ -79,11 +78,7 @@ impl Facts<'_> {
             loss: self.options.loss.name().into(),
             weights: self.parts[0].weighting.into(),
             robust: self.options.robust.map(|r| r.to_string()),
-            robust_scale: if solid_angle {
-                self.parts.iter().filter_map(|p| p.saturation.map(|(_, s)| s * unit(p).sqrt())).collect()
-            } else {
-                Vec::new()
-            },
+            robust_scale: self.parts.iter().filter_map(|p| p.saturation.map(|(_, s)| s * unit(p).sqrt())).collect(),
             relative_epsilon: if relative { self.parts.iter().flat_map(epsilon).collect() } else { Vec::new() },
             limits: self.options.limits.iter().map(ToString::to_string).collect(),
             samples: self.samples as u64,

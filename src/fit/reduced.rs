@@ -125,6 +125,18 @@ impl<'a> Problem<'a> {
         Feasible { ranges: &self.ranges[channel], cap: self.cap }
     }
 
+    /// What the bare columns of a channel are multiplied by: 1 for the lobes themselves, the lobe's weight for its slopes.
+    pub fn strength(&self, x: &DVector<f64>) -> Vec<f64> {
+        std::iter::repeat_n(1.0, x.len()).chain(self.layout.iter().map(|(lobe, _)| x[*lobe])).collect()
+    }
+
+    /// Where a channel's columns stand among all parameters: weights channel by channel, then every t.
+    pub fn place(&self, channels: usize, channel: usize) -> Vec<usize> {
+        let lobes = self.kinds.len();
+        let shapes = channels * lobes..channels * lobes + self.layout.len();
+        (channel * lobes..(channel + 1) * lobes).chain(shapes).collect()
+    }
+
     /// Half the gradient by t and the Gauss–Newton matrix of the reduced cost (Kaufman 1975): the slope columns' Gram matrix, less
     /// what the free weights can follow. `normal` is by [weights, bare slopes] of each channel, `pull` Σ w r slope.
     fn reduce(
