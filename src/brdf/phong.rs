@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::lobe::{Lobe, Parameter, above_horizon, ln_cos_alpha};
 use crate::numeric::quadrature::integrate;
-use crate::numeric::simd::{Kernel, exp, vectorised};
+use crate::numeric::simd::{Kernel, Simd, exp, vectorised};
 use crate::radiometry::flat::phong2d_normalisation;
 
 /// The exponent n; the fit searches this range.
@@ -119,7 +119,7 @@ impl Kernel for Fill<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, _simd: S) {
         let n = self.coordinates.len();
         let (values, derivatives) = (&mut self.values[..n], &mut self.derivatives[..n]);
         for i in 0..n {
@@ -200,7 +200,8 @@ fn clipped_rings(n: f64, theta: f64) -> f64 {
     }
     // The second half from its far end, where `left` = π/2 − α starts at 0 or where the lobe is negligible.
     let nearest = theta - total;
-    let (mut near, mut width) = (0.0, 1e-14 * total);
+    // cosⁿα there is a power of what is left, so that the first panel may be the wider the higher it is.
+    let (mut near, mut width) = (0.0, total * f64::powf(1e-14, 1.0 / (n + 1.0)));
     while near < total - low {
         let far = (near + width).min(total - low);
         sum += integrate(near, far, 24, |left| ring(total - left, nearest + left));

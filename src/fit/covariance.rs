@@ -3,12 +3,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::folded::{OnLines, Products, Residuals};
 use super::loss::Datum;
+use super::merl_lines::{Line, MerlLines};
 use super::passes::{Moments, Projected, Scratch};
 use super::reduced::{Problem, Solution};
 use super::samples::Block;
 use super::structure::Neighbours;
-use crate::numeric::simd::{Kernel, dot_vectorised, vectorised};
+use super::tally::Tallied;
+use crate::numeric::simd::{Kernel, Simd, dot_vectorised, vectorised};
 use crate::numeric::stats::student_quantile;
 
 /// A 95 % interval.
@@ -65,6 +68,9 @@ struct ChannelSums {
     dark: bool,
     stated: (f64, usize),
     neighbours: Neighbours,
+    /// What lines of a table have added to cost, darkness and neighbours, and to the spread.
+    on_lines: OnLines,
+    tallied: Tallied,
 }
 
 /// What a piece of the samples adds.
@@ -73,7 +79,7 @@ struct Part {
     /// Σ over clusters of neighbours of the outer product of their pull on the parameters.
     clusters: DMatrix<f64>,
     count: usize,
-    scratch: Scratch,
+    residuals: Residuals,
 }
 
 /// Standard errors at a solution. `moments` are the sums of A where they are known.
@@ -87,7 +93,10 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
     let start = || Part::new(problem, at);
     let add = |part: &mut Part, block: &Block| part.add(problem, at, block, moments.is_none());
-    let parts = if moments.is_some() { samples.map_folded(start, add) } else { samples.map_pieces(start, add) };
+    let add_lines = |part: &mut Part, lines: &MerlLines, block: &[Line]| part.add_lines(problem, at, lines, block);
+    let folded = moments.and_then(|_| samples.map_lines(start, add_lines));
+    let mut parts = folded.unwrap_or_else(|| samples.map_pieces(start, add));
+    parts.iter_mut().for_each(Part::close);
 
     let has_sigma = samples.measurement.sigma.is_some() && problem.saturation.is_none();
     let (mut normal, mut spread) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
@@ -220,27 +229,25 @@ impl Part {
             dark: false,
             stated: (0.0, 0),
             neighbours: Neighbours::default(),
+            on_lines: OnLines::default(),
+            tallied: Tallied::new(k),
         };
         let clusters = DMatrix::zeros(parameters, parameters);
-        Self { channels: vec![sums; channels], clusters, count: 0, scratch: Scratch::default() }
+        Self { channels: vec![sums; channels], clusters, count: 0, residuals: Residuals::default() }
     }
 
     /// Adds all sums over one block; `bread` says whether A is among them.
     fn add(&mut self, problem: &Problem<'_>, at: &Solution, block: &Block, bread: bool) {
         let channels = at.weights.len();
-        self.scratch.basis(block, &at.lobes);
+        self.residuals.scratch.basis(&block.x, &at.lobes);
         let clusters: Vec<std::ops::Range<usize>> = problem.samples.clusters(block);
         let mut scores = vec![DVector::<f64>::zeros(self.clusters.nrows()); clusters.len()];
         for (c, x) in at.weights.iter().enumerate() {
-            let (scratch, sums) = (&mut self.scratch, &mut self.channels[c]);
+            let (scratch, sums) = (&mut self.residuals.scratch, &mut self.channels[c]);
             sums.cost += scratch.residuals(problem.samples, block, c, x, problem.saturation);
             let (w, pairs) = (block.weight(c), &block.pairs);
             sums.neighbours.add(&Neighbours::of(&scratch.r, &scratch.trust, w, pairs));
             sums.dark |= vectorised(Dark(&block.x, w)) > 0.0;
-            if let Some(other) = &block.swapped {
-                sums.neighbours.add(&Neighbours::of(&scratch.swapped[0], &[], other.weight(c), pairs));
-                sums.dark |= vectorised(Dark(&block.x, other.weight(c))) > 0.0;
-            }
             let gradient = sums.add(problem, block, c, scratch, bread);
             let (strength, place) = (problem.strength(x), problem.place(channels, c));
             if clusters.len() == 1 {
@@ -257,6 +264,40 @@ impl Part {
         scores.iter().for_each(|s| self.clusters.ger(1.0, s, s, 1.0));
         self.count += clusters.len();
     }
+
+    /// Adds all sums over a block of a table's lines, A aside; its samples are one cluster.
+    fn add_lines(&mut self, problem: &Problem<'_>, at: &Solution, lines: &MerlLines, block: &[Line]) {
+        for line in block {
+            self.residuals.set(lines, line, problem.samples, &at.lobes);
+            for (sums, (c, x)) in self.channels.iter_mut().zip(at.weights.iter().enumerate()) {
+                self.residuals.fill(problem.samples, c, x, Products::Scatter, &mut sums.on_lines);
+                sums.tallied.add(&self.residuals.scratch);
+            }
+        }
+        if block.is_empty() {
+            return;
+        }
+        let mut score = DVector::<f64>::zeros(self.clusters.nrows());
+        let mut gradient = DVector::zeros(problem.kinds.len() + problem.layout.len());
+        for (sums, (c, x)) in self.channels.iter_mut().zip(at.weights.iter().enumerate()) {
+            sums.tallied.take_gradient(&mut gradient);
+            let (strength, place) = (problem.strength(x), problem.place(at.weights.len(), c));
+            place.iter().enumerate().for_each(|(i, p)| score[*p] += strength[i] * gradient[i]);
+        }
+        self.clusters.ger(1.0, &score, &score, 1.0);
+        self.count += 1;
+    }
+
+    /// Brings what lines left in lanes to the other sums.
+    fn close(&mut self) {
+        for sums in &mut self.channels {
+            let mut gradient = DVector::zeros(sums.spread.nrows());
+            sums.tallied.add_to(&mut gradient, &mut sums.spread);
+            sums.cost += sums.on_lines.cost();
+            sums.dark |= sums.on_lines.is_dark();
+            sums.neighbours.add(&sums.on_lines.neighbours.total());
+        }
+    }
 }
 
 /// Σ w where the lobes with a shape are 0.
@@ -266,7 +307,7 @@ impl Kernel for Dark<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> f64 {
+    fn run<S: Simd>(self, _simd: S) -> f64 {
         let ((x8, rest_x), (w8, rest_w)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
         let mut lanes = [0.0f64; 8];
         let dark = |x: f64, w: f64| if x == f64::NEG_INFINITY { w } else { 0.0 };
@@ -305,7 +346,7 @@ impl ChannelSums {
             gradient.fill(0.0);
         }
         let data_slopes = data_slopes(problem, block, channel, &scratch.f);
-        scratch.squared_pull(block);
+        scratch.squared_pull();
         if let Some(sigma) = measurement.sigma_plane(own) {
             let known = self.stated(block, w, &data_slopes, sigma);
             if problem.saturation.is_none() {
@@ -319,7 +360,6 @@ impl ChannelSums {
                 gradient.fill(0.0);
             }
         }
-        scratch.join_pull(block);
         scratch.tally(k, &mut gradient, &mut self.spread);
         for (component, total) in self.common.iter_mut().enumerate() {
             let u = measurement.common_plane(component, own);

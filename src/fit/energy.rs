@@ -1,5 +1,7 @@
 //! How much of the light a fit reflects.
 
+use rayon::prelude::*;
+
 use crate::brdf::{EnergyRecord, Material};
 
 /// Polar angles of incidence that are looked at, degrees.
@@ -12,8 +14,8 @@ const ROUNDING: f64 = 1e-12;
 /// Every lobe's is largest at normal incidence, where it is the lobe's weight, so that energy is conserved where the weights of each channel
 /// add up to at most 1.
 pub(super) fn energy(material: &Material, constrained: bool) -> Option<EnergyRecord> {
-    let by_angle =
-        ANGLES_DEG.iter().map(|a| material.directional_albedo(a.to_radians())).collect::<Option<Vec<Vec<f64>>>>()?;
+    let at = |deg: &f64| material.directional_albedo(deg.to_radians());
+    let by_angle = ANGLES_DEG.par_iter().map(at).collect::<Option<Vec<Vec<f64>>>>()?;
     let channels = material.channels.len();
     let albedo: Vec<Vec<f64>> = (0..channels).map(|c| by_angle.iter().map(|a| a[c]).collect()).collect();
     let largest = albedo.iter().flatten().copied().fold(0.0, f64::max);

@@ -11,6 +11,7 @@ mod budget;
 mod choose;
 mod covariance;
 mod energy;
+mod folded;
 mod identify;
 mod intervals;
 mod joint;
@@ -28,6 +29,7 @@ mod samples;
 pub mod solver;
 mod start;
 mod structure;
+mod tally;
 mod transform;
 
 use std::time::Instant;

@@ -3,11 +3,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::folded::{OnLines, Products, Residuals};
 use super::loss::{Loss, RobustKind};
+use super::merl_lines::{Line, MerlLines};
 use super::samples::{Block, Samples, Transforms};
+use super::tally::Tallied;
 use super::transform::Transform;
 use crate::brdf::LobeKind;
-use crate::numeric::simd::{Kernel, dot, dot_vectorised, dot3, vectorised};
+use crate::numeric::simd::{Kernel, Simd, dot, dot_vectorised, vectorised};
 
 /// A lobe of the model at given shapes (natural units).
 #[derive(Debug, Clone)]
@@ -36,16 +39,14 @@ pub(super) struct Scratch {
     pub pull: Vec<f64>,
     /// What products of columns are weighted by.
     pub weight: Vec<f64>,
-    /// r, ∂r/∂f and pull of the partners, where the block is folded.
-    pub swapped: [Vec<f64>; 3],
 }
 
 impl Scratch {
-    /// Fills the columns.
-    pub fn basis(&mut self, block: &Block, lobes: &[ShapedLobe]) {
+    /// Fills the columns, lists of the coordinates' length.
+    pub fn basis(&mut self, coordinates: &[f64], lobes: &[ShapedLobe]) {
         let slopes: usize = lobes.iter().map(|l| l.shape.len()).sum();
         self.columns.resize_with(lobes.len() + slopes, Vec::new);
-        self.columns.iter_mut().for_each(|c| c.resize(block.len(), 0.0));
+        self.columns.iter_mut().for_each(|c| c.resize(coordinates.len(), 0.0));
         let (values, derivatives) = self.columns.split_at_mut(lobes.len());
         let mut next = 0;
         for (lobe, phi) in lobes.iter().zip(values) {
@@ -55,7 +56,7 @@ impl Scratch {
                 // A lobe without a shape is the same wherever both directions are above the horizon, as all samples' are.
                 phi.fill(lobe.kind.lobe().value(&[], 0.0, &mut []));
             } else {
-                lobe.kind.lobe().fill(&lobe.shape, &block.x, phi, own);
+                lobe.kind.lobe().fill(&lobe.shape, coordinates, phi, own);
             }
             for (list, s) in own.iter_mut().zip(&lobe.shape) {
                 vectorised(Scale(list, *s));
@@ -74,20 +75,14 @@ impl Scratch {
         saturation: Saturation,
     ) -> f64 {
         let n = block.len();
-        [&mut self.f, &mut self.r, &mut self.slope, &mut self.pull].into_iter().for_each(|l| l.resize(n, 0.0));
-        vectorised(Model { phi: &self.columns[..x.len()], x: x.as_slice(), f: &mut self.f });
+        [&mut self.r, &mut self.slope, &mut self.pull].into_iter().for_each(|l| l.resize(n, 0.0));
+        self.model(x);
         let (w, y) = (block.weight(channel), &block.y[channel]);
         samples.gain(&block.cos_i, y, channel, &mut self.slope);
         if samples.loss.is_linear() && saturation.is_none() {
             self.trust.clear();
             let (r, pull) = (&mut self.r, &mut self.pull);
-            let cost = vectorised(Linear { f: &self.f, y, w, gain: &self.slope, r, pull });
-            let Some(other) = &block.swapped else { return cost };
-            let [r, slope, pull] = &mut self.swapped;
-            [&mut *r, slope, pull].into_iter().for_each(|l| l.resize(n, 0.0));
-            let (w, y) = (other.weight(channel), &other.y[channel]);
-            samples.gain(&other.cos_i, y, channel, slope);
-            return cost + vectorised(Linear { f: &self.f, y, w, gain: slope, r, pull });
+            return vectorised(Linear { f: &self.f, y, w, gain: &self.slope, r, pull });
         }
         self.trust.resize(n, 0.0);
         let data = Data { f: &self.f, cos_i: &block.cos_i, y, w };
@@ -95,70 +90,27 @@ impl Scratch {
         vectorised(Evaluate { loss: samples.loss, saturation, data, out })
     }
 
-    /// Fills the weight with w ρ′ (∂r/∂f)², the Gauss–Newton weight; partners of a folded block are added.
+    /// Fills the model values of one channel with weights `x`.
+    pub fn model(&mut self, x: &DVector<f64>) {
+        self.f.resize(self.columns.first().map_or(0, Vec::len), 0.0);
+        vectorised(Model { phi: &self.columns[..x.len()], x: x.as_slice(), f: &mut self.f });
+    }
+
+    /// Fills the weight with w ρ′ (∂r/∂f)², the Gauss–Newton weight.
     pub fn curvature(&mut self, block: &Block, channel: usize) {
-        let n = block.len();
-        self.weight.resize(n, 0.0);
-        let (slope, trust, w) = (&self.slope, &self.trust, block.weight(channel));
-        let plain = w.iter().zip(slope).map(|(w, s)| w * s * s);
-        if trust.is_empty() {
+        self.weight.resize(block.len(), 0.0);
+        let plain = block.weight(channel).iter().zip(&self.slope).map(|(w, s)| w * s * s);
+        if self.trust.is_empty() {
             self.weight.iter_mut().zip(plain).for_each(|(to, v)| *to = v);
         } else {
-            self.weight.iter_mut().zip(plain.zip(trust)).for_each(|(to, (v, t))| *to = v * t);
-        }
-        if let Some(other) = &block.swapped {
-            let also = other.weight(channel).iter().zip(&self.swapped[1]).map(|(w, s)| w * s * s);
-            self.weight.iter_mut().zip(also).for_each(|(to, v)| *to += v);
+            self.weight.iter_mut().zip(plain.zip(&self.trust)).for_each(|(to, (v, t))| *to = v * t);
         }
     }
 
-    /// Fills the weight with the squared pull; partners of a folded block are added.
-    pub fn squared_pull(&mut self, block: &Block) {
-        self.weight.resize(block.len(), 0.0);
-        vectorised(AddSquares { of: &self.pull, to: &mut self.weight, keep: 0.0 });
-        if block.swapped.is_some() {
-            vectorised(AddSquares { of: &self.swapped[2], to: &mut self.weight, keep: 1.0 });
-        }
-    }
-
-    /// Adds the partners' pull, so that the sums over the near half are those over both.
-    pub fn join_pull(&mut self, block: &Block) {
-        if block.swapped.is_some() {
-            self.pull.iter_mut().zip(&self.swapped[2]).for_each(|(a, b)| *a += b);
-        }
-    }
-
-    /// Adds Σ pull·col and the lower triangle of Σ weight·col·col.
-    pub fn tally(&self, columns: usize, gradient: &mut DVector<f64>, products: &mut DMatrix<f64>) {
-        let into = Into { gradient: gradient.as_mut_slice(), products };
-        let (list, pull, weight) = (&self.columns[..columns], &self.pull[..], &self.weight[..]);
-        match columns {
-            1 => vectorised(Tally::<1> { columns: list, pull, weight, into }),
-            2 => vectorised(Tally::<2> { columns: list, pull, weight, into }),
-            3 => vectorised(Tally::<3> { columns: list, pull, weight, into }),
-            4 => vectorised(Tally::<4> { columns: list, pull, weight, into }),
-            5 => vectorised(Tally::<5> { columns: list, pull, weight, into }),
-            _ => {
-                vectorised(Projected { columns: list, on: pull, into: into.gradient });
-                vectorised(Weighted { columns: list, weight, into: into.products });
-            }
-        }
-    }
-}
-
-/// keep · to + of².
-struct AddSquares<'a> {
-    of: &'a [f64],
-    to: &'a mut [f64],
-    keep: f64,
-}
-
-impl Kernel for AddSquares<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.to.iter_mut().zip(self.of).for_each(|(to, v)| *to = v.mul_add(*v, self.keep * *to));
+    /// Fills the weight with the squared pull.
+    pub fn squared_pull(&mut self) {
+        self.weight.clear();
+        self.weight.extend(self.pull.iter().map(|p| p * p));
     }
 }
 
@@ -168,7 +120,7 @@ impl Kernel for Scale<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, _simd: S) {
         self.0.iter_mut().for_each(|v| *v *= self.1);
     }
 }
@@ -184,80 +136,12 @@ impl Kernel for Model<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, _simd: S) {
         self.f.fill(0.0);
         for (phi, x) in self.phi.iter().zip(self.x) {
             self.f.iter_mut().zip(phi).for_each(|(f, p)| *f = x.mul_add(*p, *f));
         }
     }
-}
-
-struct Into<'a> {
-    gradient: &'a mut [f64],
-    products: &'a mut DMatrix<f64>,
-}
-
-/// All sums of K columns at once, in registers.
-struct Tally<'a, const K: usize> {
-    columns: &'a [Vec<f64>],
-    pull: &'a [f64],
-    weight: &'a [f64],
-    into: Into<'a>,
-}
-
-/// Running sums side by side.
-const LANES: usize = 8;
-
-impl<'a, const K: usize> Kernel for Tally<'a, K> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let n = self.pull.len();
-        let chunks = |list: &'a [f64]| list[..n].as_chunks::<LANES>();
-        let (pull, pull_rest) = chunks(self.pull);
-        let (weight, weight_rest) = chunks(self.weight);
-        let mut columns = [(pull, pull_rest); K];
-        for a in 0..K {
-            columns[a] = chunks(&self.columns[a]);
-            columns[a].0 = &columns[a].0[..pull.len()];
-        }
-        let weight = &weight[..pull.len()];
-        let mut gradient = [[0.0f64; LANES]; K];
-        let mut products = [[[0.0f64; LANES]; K]; K];
-        for i in 0..pull.len() {
-            for a in 0..K {
-                let column = &columns[a].0[i];
-                let mut weighted = [0.0; LANES];
-                for k in 0..LANES {
-                    gradient[a][k] = pull[i][k].mul_add(column[k], gradient[a][k]);
-                    weighted[k] = weight[i][k] * column[k];
-                }
-                // A fixed range, so that the loops unroll and the sums stay in registers.
-                for b in 0..K {
-                    if b <= a {
-                        let other = &columns[b].0[i];
-                        for k in 0..LANES {
-                            products[a][b][k] = weighted[k].mul_add(other[k], products[a][b][k]);
-                        }
-                    }
-                }
-            }
-        }
-        for a in 0..K {
-            let rest = columns[a].1;
-            self.into.gradient[a] += gradient[a].iter().sum::<f64>() + plain_dot(pull_rest, rest);
-            for b in 0..=a {
-                let last: f64 = weight_rest.iter().zip(rest).zip(columns[b].1).map(|((w, x), y)| w * x * y).sum();
-                self.into.products[(a, b)] += products[a][b].iter().sum::<f64>() + last;
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn plain_dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Gram matrices and data vectors of a linear loss. `K` columns: the lobe values, then their slopes.
@@ -324,6 +208,34 @@ pub(super) struct Sums {
     pub normal: DMatrix<f64>,
 }
 
+/// The sums of a linear loss, as `zero` has them, over the folded lines of a table; `None` where the samples are no such.
+fn line_sums(
+    samples: &Samples<'_>,
+    lobes: &[ShapedLobe],
+    weights: &[DVector<f64>],
+    zero: &Sums,
+) -> Option<Vec<Vec<Sums>>> {
+    let columns = zero.gradient.len();
+    let start = || (Residuals::default(), vec![(OnLines::default(), Tallied::new(columns)); weights.len()]);
+    let on_lines = |(residuals, sums): &mut (Residuals, Vec<_>), lines: &MerlLines, block: &[Line]| {
+        for line in block {
+            residuals.set(lines, line, samples, lobes);
+            for ((found, tallied), (c, x)) in sums.iter_mut().zip(weights.iter().enumerate()) {
+                residuals.fill(samples, c, x, Products::Curvature, found);
+                Tallied::add(tallied, &residuals.scratch);
+            }
+        }
+    };
+    let total = |(found, tallied): &(OnLines, Tallied)| {
+        let mut sums = Sums { cost: found.cost(), normal: DMatrix::zeros(columns, columns), ..zero.clone() };
+        tallied.add_to(&mut sums.gradient, &mut sums.normal);
+        sums.normal.resize_mut(zero.normal.nrows(), zero.normal.nrows(), 0.0);
+        sums
+    };
+    let parts = samples.map_lines(start, on_lines)?;
+    Some(parts.iter().map(|(_, channels)| channels.iter().map(total).collect()).collect())
+}
+
 /// What a pass over residuals is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Want {
@@ -347,26 +259,27 @@ pub(super) fn sums(
     let columns = lobes.len() + if want == Want::Weights { 0 } else { slopes };
     let matrix = if want == Want::Gradient { 0 } else { columns };
     let zero = Sums { cost: 0.0, gradient: DVector::zeros(columns), normal: DMatrix::zeros(matrix, matrix) };
-    let start = || (vec![zero.clone(); weights.len()], Scratch::default());
-    let parts = samples.map_folded(start, |(sums, scratch), block| {
-        scratch.basis(block, lobes);
-        for (c, x) in weights.iter().enumerate() {
-            let sums = &mut sums[c];
-            sums.cost += scratch.residuals(samples, block, c, x, saturation);
-            if matrix > 0 {
-                scratch.curvature(block, c);
+    let start = || vec![zero.clone(); weights.len()];
+    let folds = samples.loss.is_linear() && saturation.is_none();
+    let lines = folds.then(|| line_sums(samples, lobes, weights, &zero)).flatten();
+    let parts: Vec<Vec<Sums>> = lines.unwrap_or_else(|| {
+        let on_block = |(sums, scratch): &mut (Vec<Sums>, Scratch), block: &Block| {
+            scratch.basis(&block.x, lobes);
+            for (sums, (c, x)) in sums.iter_mut().zip(weights.iter().enumerate()) {
+                sums.cost += scratch.residuals(samples, block, c, x, saturation);
+                if matrix > 0 {
+                    scratch.curvature(block, c);
+                    scratch.tally(columns, &mut sums.gradient, &mut sums.normal);
+                } else {
+                    let (columns, on) = (&scratch.columns[..columns], &scratch.pull[..]);
+                    vectorised(Projected { columns, on, into: sums.gradient.as_mut_slice() });
+                }
             }
-            scratch.join_pull(block);
-            if matrix > 0 {
-                scratch.tally(columns, &mut sums.gradient, &mut sums.normal);
-            } else {
-                let (columns, on) = (&scratch.columns[..columns], &scratch.pull[..]);
-                vectorised(Projected { columns, on, into: sums.gradient.as_mut_slice() });
-            }
-        }
+        };
+        samples.map_pieces(|| (start(), Scratch::default()), on_block).into_iter().map(|(sums, _)| sums).collect()
     });
     let mut total = vec![zero.clone(); weights.len()];
-    for (part, _) in parts {
+    for part in parts {
         for (total, part) in total.iter_mut().zip(part) {
             total.cost += part.cost;
             total.gradient += part.gradient;
@@ -391,7 +304,7 @@ impl Kernel for Linear<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> f64 {
+    fn run<S: Simd>(self, _simd: S) -> f64 {
         let n = self.r.len();
         let (f, y, w, gain) = (&self.f[..n], &self.y[..n], &self.w[..n], &self.gain[..n]);
         let (r, pull) = (&mut self.r[..n], &mut self.pull[..n]);
@@ -501,7 +414,7 @@ impl Kernel for Evaluate<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> f64 {
+    fn run<S: Simd>(self, _simd: S) -> f64 {
         match self.loss {
             Loss::Log => self.of_loss::<Log>(),
             Loss::CubeRoot => self.of_loss::<CubeRoot>(),
@@ -553,27 +466,7 @@ impl Kernel for Projected<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, _simd: S) {
         self.into.iter_mut().zip(self.columns).for_each(|(to, column)| *to += dot(self.on, column));
-    }
-}
-
-/// Σ weight·col·col, the lower triangle.
-pub(super) struct Weighted<'a> {
-    pub columns: &'a [Vec<f64>],
-    pub weight: &'a [f64],
-    pub into: &'a mut DMatrix<f64>,
-}
-
-impl Kernel for Weighted<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for (a, column) in self.columns.iter().enumerate() {
-            for (b, other) in self.columns[..=a].iter().enumerate() {
-                self.into[(a, b)] += dot3(self.weight, column, other);
-            }
-        }
     }
 }

@@ -91,7 +91,7 @@ fn spread(problem: &Problem<'_>, at: &Solution) -> f64 {
     let nothing: Vec<_> = at.weights.iter().map(|x| x * 0.0).collect();
     let start = || (Vec::new(), 0.0f64, Scratch::default());
     let pieces = samples.map_pieces(start, |(list, largest, scratch), block| {
-        scratch.basis(block, &at.lobes);
+        scratch.basis(&block.x, &at.lobes);
         for (c, x) in at.weights.iter().enumerate() {
             let counts = |(r, w): (&f64, &f64)| (*w > 0.0).then_some(*r);
             scratch.residuals(samples, block, c, x, None);

@@ -1,7 +1,7 @@
 //! Noise or model error? Residuals of neighbouring directions are independent where they are noise, and alike where the model can't
 //! bend as the material does.
 
-use crate::numeric::simd::{Kernel, dot, dot3, map, vectorised};
+use crate::numeric::simd::{Eight, Kernel, LANES, Lanes, Simd, dot, dot3, map, vectorised};
 
 /// Sums over pairs of neighbours.
 #[derive(Debug, Clone, Copy, Default)]
@@ -36,6 +36,53 @@ impl Neighbours {
     }
 }
 
+/// [`Neighbours`] of many rows, in lanes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct PairSums {
+    product: Eight,
+    square: Eight,
+    variance: Eight,
+    count: usize,
+}
+
+impl PairSums {
+    /// Adds a row of residuals, each the neighbour of the one before, so many `vectors` long and one more; those of weight 0 are none.
+    #[inline(always)]
+    pub fn add_row<S: Simd, const N: usize>(&mut self, simd: S, r: &[f64; N], w: &[f64; N], vectors: usize) {
+        let load = |from: &[f64; N], at: usize| {
+            from[at..].first_chunk().map_or(Lanes::splat(simd, 0.0), |chunk| Lanes::load(simd, chunk))
+        };
+        let sum = |from: &Eight| Lanes::load(simd, from);
+        let half = Lanes::splat(simd, 0.5);
+        let (mut product, mut square) = (sum(&self.product), sum(&self.square));
+        let (mut variance, mut count) = (sum(&self.variance), Lanes::splat(simd, 0.0));
+        let one = Lanes::splat(simd, 1.0);
+        for i in 0..vectors {
+            let (before, after) = (load(r, i * LANES), load(r, i * LANES + 1));
+            let pair = load(w, i * LANES).min(load(w, i * LANES + 1));
+            let own = pair * before * after;
+            product = product + own;
+            variance = own.mul_add(own, variance);
+            square = (pair * half).mul_add(before.mul_add(before, after * after), square);
+            count = count + one.where_positive(pair);
+        }
+        product.store(&mut self.product);
+        square.store(&mut self.square);
+        variance.store(&mut self.variance);
+        self.count += count.sum() as usize;
+    }
+
+    pub fn total(&self) -> Neighbours {
+        let total = |lanes: &Eight| lanes.iter().sum();
+        Neighbours {
+            product: total(&self.product),
+            square: total(&self.square),
+            variance: total(&self.variance),
+            count: self.count,
+        }
+    }
+}
+
 struct Sum<'a> {
     r: &'a [f64],
     trust: &'a [f64],
@@ -47,7 +94,7 @@ impl Kernel for Sum<'_> {
     type Output = Neighbours;
 
     #[inline(always)]
-    fn run(self) -> Neighbours {
+    fn run<S: Simd>(self, _simd: S) -> Neighbours {
         let n = self.r.len();
         if n < 2 {
             return Neighbours::default();

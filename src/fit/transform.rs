@@ -7,10 +7,10 @@
 //! whose remainder is below 10⁻¹³ of Σ |ω| for any s, because e^{−s|x|} falls as fast as its derivatives rise. After that pass a cost with all
 //! its derivatives takes microseconds, however many samples there are: the search for the global minimum is free.
 
-use crate::numeric::simd::{self, Kernel, vectorised};
+use crate::numeric::simd::{self, Eight, Kernel, LANES, Lanes, Simd, vectorised};
 
 /// Moments kept of a bin.
-const MOMENTS: usize = 8;
+const MOMENTS: usize = LANES;
 /// Bins an octave, as a power of two.
 const SPLIT: u32 = 4;
 /// |x| from 2^LOWEST on is told apart; below, e^{sx} is 1 to rounding for any exponent that is searched.
@@ -65,12 +65,13 @@ impl Transform {
     }
 
     /// Adds samples at coordinates `x` ≤ 0 (−∞ where the lobes are 0); `values` holds one list a measure.
-    pub fn absorb(&mut self, x: &[f64], values: &[Vec<f64>]) {
-        match values {
+    pub fn absorb<V: AsRef<[f64]>>(&mut self, x: &[f64], values: &[V]) {
+        let values: Vec<&[f64]> = values.iter().map(AsRef::as_ref).collect();
+        match values[..] {
             [a, b] => vectorised(Absorb { into: self, x, values: [a, b] }),
             [a, b, c, d] => vectorised(Absorb { into: self, x, values: [a, b, c, d] }),
             [a, b, c, d, e, f] => vectorised(Absorb { into: self, x, values: [a, b, c, d, e, f] }),
-            many => {
+            ref many => {
                 // Any other number of channels: one at a time.
                 let (measures, mut single) = (self.measures, Self::new(1));
                 for (m, values) in many.iter().enumerate() {
@@ -90,14 +91,12 @@ impl Transform {
         }
     }
 
+    /// Adds moments to a bin.
     #[inline(always)]
-    fn flush<const M: usize>(&mut self, bin: usize, held: &[[f64; MOMENTS]; M]) {
-        if held.iter().flatten().all(|v| *v == 0.0) {
-            return;
-        }
-        let (blocks, _) = self.moments[bin * M * MOMENTS..(bin + 1) * M * MOMENTS].as_chunks_mut::<MOMENTS>();
+    fn flush<S: Simd, const M: usize>(&mut self, simd: S, bin: usize, held: &[Lanes<S>; M]) {
+        let (blocks, _) = self.moments[bin * M * MOMENTS..(bin + 1) * M * MOMENTS].as_chunks_mut();
         for (moments, held) in blocks.iter_mut().zip(held) {
-            (0..MOMENTS).for_each(|k| moments[k] += held[k]);
+            (Lanes::load(simd, moments) + *held).store(moments);
         }
         self.occupied = (self.occupied.0.min(bin), self.occupied.1.max(bin + 1));
     }
@@ -150,51 +149,71 @@ impl<const M: usize> Kernel for Absorb<'_, M> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, simd: S) {
         let Self { into, x, values } = self;
         let n = x.len();
         let values: [&[f64]; M] = std::array::from_fn(|m| &values[m][..n]);
-        let mut held = [[0.0f64; MOMENTS]; M];
-        let (mut bin, mut centre, mut inverse) = (0, 0.0, 0.0);
+        let (zero, powers) = (Lanes::splat(simd, 0.0), Powers::new(simd));
+        let mut held = [zero; M];
+        // No bin is held at first.
+        let (mut bin, mut centre, mut inverse) = (usize::MAX, 0.0, 0.0);
         for i in 0..n {
             if x[i] == f64::NEG_INFINITY {
                 (0..M).for_each(|m| into.dark[m] += values[m][i]);
                 continue;
             }
             let own = bin_number(x[i]);
-            if own != bin || inverse == 0.0 {
-                into.flush(bin, &held);
-                held = [[0.0; MOMENTS]; M];
+            if own != bin {
+                if bin != usize::MAX {
+                    into.flush(simd, bin, &held);
+                }
+                held = [zero; M];
                 bin = own;
                 let half;
                 (centre, half) = bin_geometry(bin);
                 inverse = 1.0 / half;
             }
-            let powers = powers((centre + x[i]) * inverse);
+            let powers = powers.of((centre + x[i]) * inverse);
             for m in 0..M {
-                let value = values[m][i];
-                for k in 0..MOMENTS {
-                    held[m][k] = value.mul_add(powers[k], held[m][k]);
-                }
+                held[m] = Lanes::splat(simd, values[m][i]).mul_add(powers, held[m]);
             }
         }
-        into.flush(bin, &held);
+        if bin != usize::MAX {
+            into.flush(simd, bin, &held);
+        }
     }
 }
 
-/// 1, d, d², … d⁷.
-#[inline(always)]
-fn powers(d: f64) -> [f64; MOMENTS] {
-    // By the bits of the exponent, so that it takes three vectors and two products.
-    let (d2, d4) = (d * d, d * d * (d * d));
-    let (one, two, four) =
-        ([1.0, d, 1.0, d, 1.0, d, 1.0, d], [1.0, 1.0, d2, d2, 1.0, 1.0, d2, d2], [1.0, 1.0, 1.0, 1.0, d4, d4, d4, d4]);
-    std::array::from_fn(|k| one[k] * two[k] * four[k])
+/// 1, d, d², … d⁷, by the bits of the exponent: 1 or d, times 1 or d², times 1 or d⁴.
+struct Powers<S: Simd> {
+    simd: S,
+    without: [Lanes<S>; 3],
+    with: [Lanes<S>; 3],
 }
 
-/// 1/k!
-const INVERSE_FACTORIAL: [f64; MOMENTS] =
-    [1.0, 1.0, 0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0];
+impl<S: Simd> Powers<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        let bits = |bit: usize, set: bool| {
+            let lanes: Eight = std::array::from_fn(|k| if (k >> bit & 1 == 1) == set { 1.0 } else { 0.0 });
+            Lanes::load(simd, &lanes)
+        };
+        Self { simd, without: [0, 1, 2].map(|b| bits(b, false)), with: [0, 1, 2].map(|b| bits(b, true)) }
+    }
+
+    #[inline(always)]
+    fn of(&self, d: f64) -> Lanes<S> {
+        let factor = |bit: usize, d: f64| self.with[bit].mul_add(Lanes::splat(self.simd, d), self.without[bit]);
+        factor(0, d) * factor(1, d * d) * factor(2, d * d * (d * d))
+    }
+}
+
+/// 1/k!, and the factors of its derivatives: 1/(k − 1)! and 1/(k − 2)!, 0 before they begin.
+const INVERSE_FACTORIALS: [Eight; 3] = [
+    [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0],
+    [0.0, 1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0],
+    [0.0, 0.0, 1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0],
+];
 
 struct Evaluate<'a, const M: usize> {
     of: &'a Transform,
@@ -206,38 +225,42 @@ impl<const M: usize> Kernel for Evaluate<'_, M> {
     type Output = [Jet; M];
 
     #[inline(always)]
-    fn run(self) -> [Jet; M] {
-        let mut lanes = [[[0.0f64; MOMENTS]; 3]; M];
-        let stride = self.of.measures * MOMENTS;
-        for bin in self.of.occupied.0..self.of.occupied.1 {
+    fn run<S: Simd>(self, simd: S) -> [Jet; M] {
+        let splat = |x: f64| Lanes::splat(simd, x);
+        let mut lanes = [[splat(0.0); 3]; M];
+        let (stride, s) = (self.of.measures * MOMENTS, self.s);
+        let bins = self.of.occupied.0..self.of.occupied.1.max(self.of.occupied.0);
+        // e^{−s·centre} of all bins first, many at a time.
+        let mut peaks = [0.0; BINS];
+        let peaks = &mut peaks[bins.clone()];
+        for (peak, bin) in peaks.iter_mut().zip(bins.clone()) {
+            *peak = simd::exp(-s * bin_geometry(bin).0);
+        }
+        let (powers, factorials) = (Powers::new(simd), INVERSE_FACTORIALS.map(|list| Lanes::load(simd, &list)));
+        for (bin, peak) in bins.zip(&*peaks) {
             let (centre, half) = bin_geometry(bin);
-            if self.s * centre > 745.0 {
+            if s * centre > 745.0 {
                 break; // the bins ascend: all that follow are 0
             }
-            let z = powers(self.s * half);
-            let peak = simd::exp(-self.s * centre);
-            // Coefficients of the moments in e^{sx} and its derivatives: c_k = e^{−sv} zᵏ/k!, then d/ds of it.
-            let mut c = [[0.0f64; MOMENTS]; 3];
-            for k in 0..MOMENTS {
-                c[0][k] = peak * z[k] * INVERSE_FACTORIAL[k];
-            }
-            for k in 0..MOMENTS {
-                let below = if k > 0 { c[0][k - 1] } else { 0.0 };
-                let second = if k > 1 { c[0][k - 2] } else { 0.0 };
-                c[1][k] = half * below - centre * c[0][k];
-                c[2][k] = half * half * second - 2.0 * centre * half * below + centre * centre * c[0][k];
-            }
+            // Coefficients of the moments in e^{sx}: a_k = e^{−sv} zᵏ/k!, and with one and two powers of z fewer.
+            let z = powers.of(s * half);
+            let a0 = splat(*peak) * z * factorials[0];
+            let a1 = splat(*peak) * z.shifted(1) * factorials[1];
+            let a2 = splat(*peak) * z.shifted(2) * factorials[2];
+            let (v, h) = (splat(centre), splat(half));
+            // d/ds brings down h from a power of z and −v from the exponential.
+            let first = h * a1 - v * a0;
+            let second = h * (h * a2 - v * (a1 + a1)) + v * v * a0;
             let start = bin * stride + self.first * MOMENTS;
-            let (blocks, _) = self.of.moments[start..start + M * MOMENTS].as_chunks::<MOMENTS>();
+            let (blocks, _) = self.of.moments[start..start + M * MOMENTS].as_chunks();
             for (lanes, moments) in lanes.iter_mut().zip(blocks) {
-                for (lane, c) in lanes.iter_mut().zip(&c) {
-                    for k in 0..MOMENTS {
-                        lane[k] = c[k].mul_add(moments[k], lane[k]);
-                    }
-                }
+                let moments = Lanes::load(simd, moments);
+                lanes[0] = a0.mul_add(moments, lanes[0]);
+                lanes[1] = first.mul_add(moments, lanes[1]);
+                lanes[2] = second.mul_add(moments, lanes[2]);
             }
         }
-        lanes.map(|jet| jet.map(|lane| lane.iter().sum()))
+        lanes.map(|jet| jet.map(Lanes::sum))
     }
 }
 
@@ -308,6 +331,21 @@ mod tests {
             let (centre, half) = bin_geometry(bin);
             assert!(bin < BINS && ((v - centre).abs() <= half || v > 1024.0), "{v}: {centre} ± {half}");
             assert!(bin == 0 || half <= centre / 30.0);
+        }
+    }
+
+    #[test]
+    fn every_vector_unit_gives_the_same_bits() {
+        let mut rng = stream(12, Purpose::Study, 1);
+        let x: Vec<f64> = (0..999).map(|_| -(rng.random::<f64>() * 30.0 - 20.0).exp2()).collect();
+        let values: Vec<Vec<f64>> = (0..2).map(|_| x.iter().map(|_| rng.random::<f64>() - 0.5).collect()).collect();
+        let (mut widest, mut plain) = (Transform::new(2), Transform::new(2));
+        widest.absorb(&x, &values);
+        Absorb { into: &mut plain, x: &x, values: [&values[0], &values[1]] }.run(pulp::Scalar512b);
+        assert_eq!(widest.moments, plain.moments);
+        for s in [0.0, 3.7, 4e5] {
+            let scalar = Evaluate::<1> { of: &plain, s, first: 1 }.run(pulp::Scalar512b);
+            assert_eq!(widest.at(s, 1..2), scalar);
         }
     }
 }

@@ -5,31 +5,166 @@
 //! program runs. Kernels add in fixed lanes and multiply-add by [`f64::mul_add`], whose result does not depend on the machine,
 //! so all of them give the same bits.
 
-use pulp::{Arch, Simd, WithSimd};
+use std::ops::{Add, Mul, Sub};
+
+pub use pulp::Simd;
+use pulp::{Scalar512b, WithSimd};
+
+/// Numbers side by side: as many as the widest register holds. On narrower machines several registers stand for it.
+pub const LANES: usize = 8;
 
 /// Work to be compiled for every vector unit. Mark `run` and whatever it calls `#[inline(always)]`, else it stays scalar.
 pub trait Kernel {
     /// What it returns.
     type Output;
 
-    /// The work.
-    fn run(self) -> Self::Output;
+    /// The work; `simd` is for [`Lanes`].
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-struct Dispatched<K>(K);
+/// A kernel with the vectors that it is to use.
+struct Dispatched<K, S>(K, S);
 
-impl<K: Kernel> WithSimd for Dispatched<K> {
+impl<K: Kernel, S: Simd> WithSimd for Dispatched<K, S> {
     type Output = K::Output;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> K::Output {
-        self.0.run()
+    fn with_simd<Native: Simd>(self, _native: Native) -> K::Output {
+        const { assert!(S::F64_LANES == LANES) };
+        self.0.run(self.1)
     }
 }
 
 /// Runs a kernel on the widest vector unit there is.
 pub fn vectorised<K: Kernel>(kernel: K) -> K::Output {
-    Arch::new().dispatch(Dispatched(kernel))
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        if let Some(v4) = pulp::x86::V4::try_new() {
+            return Simd::vectorize(v4, Dispatched(kernel, v4));
+        }
+        if let Some(v3) = pulp::x86::V3::try_new() {
+            return Simd::vectorize(v3, Dispatched(kernel, pulp::x86::V3_512b(v3)));
+        }
+    }
+    kernel.run(Scalar512b)
+}
+
+/// [`LANES`] numbers in registers.
+#[must_use]
+#[derive(Debug, Clone, Copy)]
+pub struct Lanes<S: Simd> {
+    simd: S,
+    v: S::f64s,
+}
+
+/// A number for each lane.
+pub type Eight = [f64; LANES];
+
+impl<S: Simd> Lanes<S> {
+    /// The same number in every lane.
+    #[inline(always)]
+    pub fn splat(simd: S, x: f64) -> Self {
+        Self { simd, v: simd.splat_f64s(x) }
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub fn load(simd: S, from: &Eight) -> Self {
+        Self { simd, v: S::as_simd_f64s(from).0[0] }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub fn store(self, to: &mut Eight) {
+        S::as_mut_simd_f64s(to).0[0] = self.v;
+    }
+
+    /// self·b + c, rounded once.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        Self { v: self.simd.mul_add_f64s(self.v, b.v, c.v), ..self }
+    }
+
+    /// Every number `by` lanes on; those that fall off at the end come in at the beginning.
+    #[inline(always)]
+    pub fn shifted(self, by: usize) -> Self {
+        Self { v: self.simd.rotate_right_f64s(self.v, by), ..self }
+    }
+
+    /// The lanes' sum, always in the same order.
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        let mut lanes = [0.0; LANES];
+        self.store(&mut lanes);
+        lanes.iter().sum()
+    }
+
+    /// |self|.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self { v: self.simd.abs_f64s(self.v), ..self }
+    }
+
+    /// The larger one; neither may be NaN.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self { v: self.simd.max_f64s(self.v, other.v), ..self }
+    }
+
+    /// The smaller one; neither may be NaN.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self { v: self.simd.min_f64s(self.v, other.v), ..self }
+    }
+
+    /// self where `test` is a number, 0 where it is NaN.
+    #[inline(always)]
+    pub fn where_known(self, test: Self) -> Self {
+        let known = self.simd.equal_f64s(test.v, test.v);
+        Self { v: self.simd.select_f64s(known, self.v, self.simd.splat_f64s(0.0)), ..self }
+    }
+
+    /// self where `test` > 0, 0 elsewhere.
+    #[inline(always)]
+    pub fn where_positive(self, test: Self) -> Self {
+        let zero = self.simd.splat_f64s(0.0);
+        let positive = self.simd.less_than_f64s(zero, test.v);
+        Self { v: self.simd.select_f64s(positive, self.v, zero), ..self }
+    }
+
+    /// self where `test` is −∞, 0 elsewhere.
+    #[inline(always)]
+    pub fn where_dark(self, test: Self) -> Self {
+        let dark = self.simd.equal_f64s(test.v, self.simd.splat_f64s(f64::NEG_INFINITY));
+        Self { v: self.simd.select_f64s(dark, self.v, self.simd.splat_f64s(0.0)), ..self }
+    }
+}
+
+impl<S: Simd> Add for Lanes<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self { v: self.simd.add_f64s(self.v, other.v), ..self }
+    }
+}
+
+impl<S: Simd> Sub for Lanes<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self { v: self.simd.sub_f64s(self.v, other.v), ..self }
+    }
+}
+
+impl<S: Simd> Mul for Lanes<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self { v: self.simd.mul_f64s(self.v, other.v), ..self }
+    }
 }
 
 /// ln 2 in two parts: the first has zeros at its end, so that small multiples of it are exact.
@@ -113,17 +248,17 @@ pub fn map(a: &[f64], b: &[f64], out: &mut [f64], f: impl Fn(f64, f64) -> f64) {
     }
 }
 
-/// Running sums per kernel: as many as two AVX-512 registers hold, whatever the machine.
-const LANES: usize = 16;
+/// Running sums of a dot product: two registers full, so that one product need not wait for the one before.
+const SUMS: usize = 2 * LANES;
 
 /// Σ a·b in fixed lanes.
 #[inline(always)]
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a16, rest_a), (b16, rest_b)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
-    let mut lanes = [0.0f64; LANES];
+    let ((a16, rest_a), (b16, rest_b)) = (a.as_chunks::<SUMS>(), b.as_chunks::<SUMS>());
+    let mut lanes = [0.0f64; SUMS];
     for (a, b) in a16.iter().zip(b16) {
-        for k in 0..LANES {
+        for k in 0..SUMS {
             lanes[k] = a[k].mul_add(b[k], lanes[k]);
         }
     }
@@ -142,7 +277,7 @@ impl Kernel for Dot<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> f64 {
+    fn run<S: Simd>(self, _simd: S) -> f64 {
         dot(self.0, self.1)
     }
 }
@@ -151,12 +286,12 @@ impl Kernel for Dot<'_> {
 #[inline(always)]
 #[must_use]
 pub fn dot3(a: &[f64], b: &[f64], c: &[f64]) -> f64 {
-    let (a16, rest_a) = a.as_chunks::<LANES>();
-    let (b16, rest_b) = b.as_chunks::<LANES>();
-    let (c16, rest_c) = c.as_chunks::<LANES>();
-    let mut lanes = [0.0f64; LANES];
+    let (a16, rest_a) = a.as_chunks::<SUMS>();
+    let (b16, rest_b) = b.as_chunks::<SUMS>();
+    let (c16, rest_c) = c.as_chunks::<SUMS>();
+    let mut lanes = [0.0f64; SUMS];
     for ((a, b), c) in a16.iter().zip(b16).zip(c16) {
-        for k in 0..LANES {
+        for k in 0..SUMS {
             lanes[k] = (a[k] * b[k]).mul_add(c[k], lanes[k]);
         }
     }
@@ -174,7 +309,7 @@ mod tests {
         type Output = ();
 
         #[inline(always)]
-        fn run(self) {
+        fn run<S: Simd>(self, _simd: S) {
             self.2.iter_mut().zip(self.1).for_each(|(o, x)| *o = (self.0)(*x));
         }
     }

@@ -2,177 +2,31 @@
 //!
 //! A MERL table's samples are made block by block from the table itself; of any other measurement they are listed once.
 
+mod block;
+mod select;
+
 use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::loss::{Datum, Loss, RELATIVE_EPSILON};
-use super::merl_lines::{self, Fold, Folded, MerlLines, Seen};
+pub(in crate::fit) use block::Block;
+use block::{Values, neighbours};
+use select::{Judge, Left, least_cos};
+pub(in crate::fit) use select::{Thin, offset};
+
+use super::folded::{Gathered, Seen};
+use super::loss::{Loss, RELATIVE_EPSILON};
+use super::merl_lines::{self, Line, MerlLines};
 use super::options::{FitError, FitOptions, WeightMode};
 use super::transform::Transform;
 use crate::brdf::{LobeKind, ModelSpec};
 use crate::measurement::{Directions, Measurement};
-use crate::numeric::simd::{Kernel, vectorised};
+use crate::numeric::simd::vectorised;
 use crate::numeric::sum::{self, BLOCK};
-
-/// Slack in the cosine that makes the angular limit inclusive whatever the rounding of the direction.
-const INCLUSIVE: f64 = 1e-12;
 
 /// Samples of a list that are taken as one when model error is judged.
 const CLUSTER: usize = 64;
-
-/// Samples in a row, structure of arrays. Lists by channel hold the channels of the fit, in its order.
-#[derive(Debug, Default, Clone)]
-pub(super) struct Block {
-    /// Index of each sample in the measurement; left out for a table without σ.
-    pub index: Vec<u32>,
-    /// cosθi.
-    pub cos_i: Vec<f64>,
-    /// Coordinate of the lobes that have a shape.
-    pub x: Vec<f64>,
-    /// 1 where a sample is a neighbour of the one before, else 0.
-    pub pairs: Vec<f64>,
-    /// Normalised weight w, one list for all channels or one a channel; 0 where masked.
-    pub w: Vec<Vec<f64>>,
-    /// Measured value over [`Samples::scale`], one list a channel; 0 where masked.
-    pub y: Vec<Vec<f64>>,
-    /// The samples with the two directions swapped, where the block is folded: they have the same coordinate.
-    pub swapped: Option<Box<Swapped>>,
-}
-
-/// The partners of a folded block's samples; weight 0 where there is none.
-#[derive(Debug, Default, Clone)]
-pub(super) struct Swapped {
-    pub cos_i: Vec<f64>,
-    pub w: Vec<Vec<f64>>,
-    pub y: Vec<Vec<f64>>,
-}
-
-impl Swapped {
-    /// Weights of one channel.
-    pub fn weight(&self, channel: usize) -> &[f64] {
-        if self.w.len() == 1 { &self.w[0] } else { &self.w[channel] }
-    }
-}
-
-impl Block {
-    fn reset(&mut self, lists: usize, channels: usize) {
-        self.index.clear();
-        self.cos_i.clear();
-        self.x.clear();
-        self.pairs.clear();
-        self.w.resize_with(lists, Vec::new);
-        self.y.resize_with(channels, Vec::new);
-        self.w.iter_mut().chain(&mut self.y).for_each(Vec::clear);
-        if let Some(swapped) = &mut self.swapped {
-            swapped.cos_i.clear();
-            swapped.w.resize_with(lists, Vec::new);
-            swapped.y.resize_with(channels, Vec::new);
-            swapped.w.iter_mut().chain(&mut swapped.y).for_each(Vec::clear);
-        }
-    }
-
-    /// Number of samples (of one side, where the block is folded).
-    pub fn len(&self) -> usize {
-        self.pairs.len()
-    }
-
-    /// Weights of one channel.
-    pub fn weight(&self, channel: usize) -> &[f64] {
-        if self.w.len() == 1 { &self.w[0] } else { &self.w[channel] }
-    }
-
-    /// The samples ordered by direction, so that neighbours stand together and the order of the file does not matter.
-    fn neighbours_together(&self, wi: &[DVec3], wo: &[DVec3]) -> Self {
-        let mut order: Vec<([i32; 4], u32)> = (0..self.len() as u32)
-            .into_par_iter()
-            .map(|k| {
-                let entry = self.index[k as usize] as usize;
-                let ([a, b], [c, d]) = (place(wi[entry]), place(wo[entry]));
-                ([a, b, c, d], k)
-            })
-            .collect();
-        order.par_sort_unstable();
-        let pick = |list: &Vec<f64>| order.iter().map(|(_, k)| list[*k as usize]).collect();
-        let index: Vec<u32> = order.iter().map(|(_, k)| self.index[*k as usize]).collect();
-        Self {
-            pairs: neighbours(&index, |a, b| {
-                wi[a].distance_squared(wi[b]) < SAME_INCIDENCE && wo[a].distance_squared(wo[b]) < FARTHEST
-            }),
-            index,
-            cos_i: pick(&self.cos_i),
-            x: pick(&self.x),
-            w: self.w.iter().map(pick).collect(),
-            y: self.y.iter().map(pick).collect(),
-            swapped: None,
-        }
-    }
-
-    fn reserve(&mut self, samples: usize) {
-        self.index.reserve_exact(samples);
-        [&mut self.cos_i, &mut self.x, &mut self.pairs].into_iter().for_each(|l| l.reserve_exact(samples));
-        self.w.iter_mut().chain(&mut self.y).for_each(|l| l.reserve_exact(samples));
-    }
-
-    fn append(&mut self, other: &Self) {
-        self.index.extend_from_slice(&other.index);
-        self.cos_i.extend_from_slice(&other.cos_i);
-        self.x.extend_from_slice(&other.x);
-        self.pairs.extend_from_slice(&other.pairs);
-        let pairs = self.w.iter_mut().chain(&mut self.y).zip(other.w.iter().chain(&other.y));
-        pairs.for_each(|(list, more)| list.extend_from_slice(more));
-    }
-}
-
-/// Incidences closer than this (squared chord of the unit sphere) are the same.
-const SAME_INCIDENCE: f64 = 1e-8;
-/// Directions farther apart than this (squared chord, about 14°) are no neighbours.
-const FARTHEST: f64 = 0.0625;
-
-/// 1 for every entry that is `near` the one before.
-fn neighbours(index: &[u32], near: impl Fn(usize, usize) -> bool) -> Vec<f64> {
-    let pair = |p: &[u32]| if near(p[0] as usize, p[1] as usize) { 1.0 } else { 0.0 };
-    std::iter::once(0.0).take(index.len()).chain(index.windows(2).map(pair)).collect()
-}
-
-/// A direction's polar ring and its place on it, coarse enough to overlook rounding.
-fn place(w: DVec3) -> [i32; 2] {
-    const STEPS: f64 = 1e5;
-    // The azimuth by the way round a square: monotone, and cheaper than an arctangent.
-    let size = w.x.abs() + w.y.abs();
-    let round = if size > 1e-9 { w.y / size } else { 0.0 };
-    let round = if w.x < 0.0 { 2.0 - round } else { round };
-    [(w.z * STEPS).round() as i32, (round * STEPS).round() as i32]
-}
-
-/// The last `more` places of a list that grows by so many zeros.
-fn grown(list: &mut Vec<f64>, more: usize) -> &mut [f64] {
-    let start = list.len();
-    list.resize(start + more, 0.0);
-    &mut list[start..]
-}
-
-/// Values over their unit and their weights, both 0 where the value is masked.
-struct Values<'a> {
-    unit: f64,
-    y: &'a mut [f64],
-    w: &'a mut [f64],
-}
-
-impl Kernel for Values<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for (w, y) in self.w.iter_mut().zip(&*self.y) {
-            *w = if y.is_nan() { 0.0 } else { *w };
-        }
-        for y in self.y {
-            *y = if y.is_nan() { 0.0 } else { *y * self.unit };
-        }
-    }
-}
 
 #[derive(Debug)]
 enum Source {
@@ -182,7 +36,7 @@ enum Source {
 
 /// The samples with a positive weight in at least one channel, in the measurement's order.
 #[derive(Debug)]
-pub(super) struct Samples<'a> {
+pub(in crate::fit) struct Samples<'a> {
     /// The table they come from.
     pub measurement: &'a Measurement,
     /// The measurement's channels that are fitted.
@@ -278,33 +132,19 @@ impl<'a> Samples<'a> {
             return None;
         }
         let planes: [&[f64]; M] = std::array::from_fn(|m| self.measurement.plane(self.channels[m]));
-        let cosine = self.loss == Loss::CosineL2;
+        let cosine = self.is_cosine();
         let piece = |p: usize| {
-            let (mut sums, mut seen) = (Transform::new(1 + M), Seen::<M>::default());
-            let (mut x, mut values) = (Vec::new(), vec![Vec::new(); 1 + M]);
-            for b in MerlLines::blocks() * p / PIECES..MerlLines::blocks() * (p + 1) / PIECES {
-                for line in lines.lines(b) {
-                    let on_line = planes.map(|plane| &plane[line.entries()]);
-                    let (x_out, sums_out) = (&mut x, &mut values[..]);
-                    vectorised(Folded {
-                        lines,
-                        line: &line,
-                        values: on_line,
-                        cosine,
-                        x: x_out,
-                        sums: sums_out,
-                        seen: &mut seen,
-                    });
-                    sums.absorb(&x, &values);
-                }
+            let mut sums = Gathered::<M>::new();
+            for b in piece(p, PIECES, MerlLines::blocks()) {
+                lines.lines(b).for_each(|line| sums.add(lines, &line, planes, cosine));
             }
-            (sums, seen)
+            sums
         };
-        let parts: Vec<(Transform, Seen<M>)> = (0..PIECES).into_par_iter().map(piece).collect();
+        let parts: Vec<Gathered<M>> = (0..PIECES).into_par_iter().map(piece).collect();
         let (mut total, mut seen) = (Transform::new(1 + M), Seen::<M>::default());
-        for (part, found) in &parts {
-            total.merge(part);
-            seen.add(found);
+        for part in &parts {
+            total.merge(&part.transform);
+            seen.add(&part.seen());
         }
         let plain = seen.unlike == 0.0 && seen.count > 0.0;
         if !plain || !(LEAST_UNSCALED..1.0 / LEAST_UNSCALED).contains(&seen.largest) {
@@ -329,6 +169,16 @@ impl<'a> Samples<'a> {
         let plain =
             options.loss.is_linear() && options.robust.is_none() && !options.use_sigma && options.stride == 1 && own;
         plain.then(|| MerlLines::new(grid, least_cos(options), solid_angle))
+    }
+
+    /// Whether residuals are times cosθi.
+    pub fn is_cosine(&self) -> bool {
+        self.loss == Loss::CosineL2
+    }
+
+    /// What the raw weights of a channel of a table are multiplied by.
+    pub fn factor(&self, channel: usize) -> f64 {
+        self.factor[channel]
     }
 
     /// Number of directions that count.
@@ -370,39 +220,36 @@ impl<'a> Samples<'a> {
         start: impl Fn() -> T + Sync + Send,
         add: impl Fn(&mut T, &Block) + Sync + Send,
     ) -> Vec<T> {
-        self.pieces(Block::default, start, add)
-    }
-
-    /// As [`Samples::map_pieces`], with the samples of a table folded about φd = 90° where errors are not asked of them one by one.
-    pub fn map_folded<T: Send>(
-        &self,
-        start: impl Fn() -> T + Sync + Send,
-        add: impl Fn(&mut T, &Block) + Sync + Send,
-    ) -> Vec<T> {
-        let plain =
-            self.measurement.sigma.is_none() && self.measurement.common.is_empty() && self.loss != Loss::Relative;
-        let folds = plain && matches!(self.source, Source::Merl(_));
-        let block = || Block { swapped: folds.then(Box::default), ..Block::default() };
-        self.pieces(block, start, add)
-    }
-
-    fn pieces<T: Send>(
-        &self,
-        block: impl Fn() -> Block + Sync + Send,
-        start: impl Fn() -> T + Sync + Send,
-        add: impl Fn(&mut T, &Block) + Sync + Send,
-    ) -> Vec<T> {
         let blocks = self.blocks();
         let pieces = PIECES.min(blocks).max(1);
         let run = |p: usize| {
-            let (mut sums, mut block) = (start(), block());
-            for b in blocks * p / pieces..blocks * (p + 1) / pieces {
+            let (mut sums, mut block) = (start(), Block::default());
+            for b in piece(p, pieces, blocks) {
                 self.fill(b, &mut block);
                 add(&mut sums, &block);
             }
             sums
         };
         (0..pieces).into_par_iter().map(run).collect()
+    }
+
+    /// As [`Samples::map_pieces`], over blocks of a table's lines, where the samples are such and the loss is one that folds.
+    pub fn map_lines<T: Send>(
+        &self,
+        start: impl Fn() -> T + Sync + Send,
+        add: impl Fn(&mut T, &MerlLines, &[Line]) + Sync + Send,
+    ) -> Option<Vec<T>> {
+        let errors = self.measurement.sigma.is_some() || !self.measurement.common.is_empty();
+        let Source::Merl(lines) = &self.source else { return None };
+        let run = |p: usize| {
+            let mut sums = start();
+            for b in piece(p, PIECES, MerlLines::blocks()) {
+                add(&mut sums, lines, &lines.lines(b).collect::<Vec<_>>());
+            }
+            sums
+        };
+        let folds = !errors && self.loss != Loss::Relative;
+        folds.then(|| (0..PIECES).into_par_iter().map(run).collect())
     }
 
     /// Writes block `b` into `block`.
@@ -420,47 +267,32 @@ impl<'a> Samples<'a> {
             }
             Source::Merl(lines) => {
                 for line in lines.lines(b) {
-                    let fold = lines.append(&line, block);
-                    self.append_values(line.entries(), fold, line.weight, block);
+                    lines.append(&line, block);
+                    self.append_values(line.entries(), line.weight, block);
                 }
                 merl_lines::finish(block);
                 let unit = 1.0 / self.scale;
-                let swapped = block.swapped.as_deref_mut().map(|s| (&mut s.w, &mut s.y));
-                for (w, y) in std::iter::once((&mut block.w, &mut block.y)).chain(swapped) {
-                    for c in (0..y.len()).rev() {
-                        let none = &mut Vec::new();
-                        let w = w.get_mut(c).unwrap_or(none);
-                        vectorised(Values { unit, y: &mut y[c], w });
-                    }
+                for c in (0..block.y.len()).rev() {
+                    let none = &mut Vec::new();
+                    let w = block.w.get_mut(c).unwrap_or(none);
+                    vectorised(Values { unit, y: &mut block.y[c], w });
                 }
             }
         }
     }
 
-    /// Appends weights and values of entries in a row of a table, folded or plain.
-    fn append_values(&self, entries: Range<usize>, fold: Option<Fold>, weight: f64, block: &mut Block) {
+    /// Appends weights and values of entries in a row of a table.
+    fn append_values(&self, entries: Range<usize>, weight: f64, block: &mut Block) {
         let start = block.pairs.len();
-        let near = fold.map_or(entries.len(), Fold::len);
-        block.pairs.resize(start + near, 1.0);
+        block.pairs.resize(start + entries.len(), 1.0);
         block.pairs[start] = 0.0;
         for c in 0..block.y.len() {
-            let plane = &self.measurement.plane(self.channels[c])[entries.clone()];
-            let weight = weight * self.factor[c];
-            block.y[c].extend_from_slice(&plane[..near]);
+            block.y[c].extend_from_slice(&self.measurement.plane(self.channels[c])[entries.clone()]);
             if c < self.lists {
-                grown(&mut block.w[c], near).fill(weight);
-            }
-            if let (Some(fold), Some(swapped)) = (fold, &mut block.swapped) {
-                let y = grown(&mut swapped.y[c], near);
-                y.fill(f64::NAN); // those without a partner are masked
-                y[fold.partners()].copy_from_slice(&plane[fold.far()]);
-                y[fold.partners()].reverse();
-                if c < self.lists {
-                    grown(&mut swapped.w[c], near).fill(weight);
-                }
+                block.w[c].resize(start + entries.len(), weight * self.factor[c]);
             }
         }
-        if fold.is_none() && (self.measurement.sigma.is_some() || !self.measurement.common.is_empty()) {
+        if self.measurement.sigma.is_some() || !self.measurement.common.is_empty() {
             block.index.extend(entries.map(|e| e as u32));
         }
     }
@@ -702,139 +534,10 @@ const LEAST_UNSCALED: f64 = 1e-100;
 /// Pieces that a pass with large sums is cut into; it fixes how they are bracketed.
 const PIECES: usize = 16;
 
+/// The blocks of piece `p`.
+fn piece(p: usize, pieces: usize, blocks: usize) -> Range<usize> {
+    blocks * p / pieces..blocks * (p + 1) / pieces
+}
+
 /// The transforms of weights and weighted data (measures: lists, then channels), and each channel's energy Σ w g² y².
-pub(super) type Transforms = (Transform, Vec<f64>);
-
-fn least_cos(options: &FitOptions) -> f64 {
-    options.max_angle_deg.to_radians().cos() - INCLUSIVE
-}
-
-/// Decides entry by entry.
-struct Judge<'a> {
-    samples: &'a Samples<'a>,
-    options: &'a FitOptions,
-    least_cos: f64,
-    solid_angle: bool,
-    kind: Option<LobeKind>,
-    thin: Thin,
-    /// The relative loss's ε for the weights by σ, channel by channel: of all values, each counting for one.
-    epsilon: Vec<f64>,
-}
-
-/// Which entries of a measurement are looked at: of every `step` runs of `run` entries one, at a place that varies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Thin {
-    pub step: usize,
-    pub run: usize,
-}
-
-impl Thin {
-    /// All of them.
-    pub const NONE: Self = Self { step: 1, run: 1 };
-
-    fn keeps(self, entry: usize) -> bool {
-        let run = entry / self.run;
-        self.step == 1 || run % self.step == offset(run / self.step, self.step)
-    }
-}
-
-/// Which of the `step` entries of run `run` a thinned-out list keeps: spread evenly, without a beat with the grid's own period.
-pub(super) fn offset(run: usize, step: usize) -> usize {
-    let golden = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-    ((golden * step as u64) >> 32) as usize
-}
-
-/// Entries left out, by reason.
-#[derive(Debug, Default)]
-struct Left {
-    entries: usize,
-    below: usize,
-    beyond: usize,
-    masked: usize,
-    weightless: usize,
-    /// Values, not entries, that the loss can't take.
-    refused: usize,
-}
-
-impl Left {
-    fn add(&mut self, other: &Self) {
-        self.entries += other.entries;
-        self.below += other.below;
-        self.beyond += other.beyond;
-        self.masked += other.masked;
-        self.weightless += other.weightless;
-        self.refused += other.refused;
-    }
-
-    fn error(&self, measurement: &Measurement, max_angle_deg: f64) -> FitError {
-        FitError::NothingToFit {
-            name: measurement.name.clone(),
-            entries: self.entries,
-            below: self.below,
-            beyond: self.beyond,
-            masked: self.masked,
-            weightless: self.weightless,
-            max_angle_deg,
-        }
-    }
-}
-
-impl Judge<'_> {
-    /// The samples among these entries.
-    fn list(&self, range: Range<usize>) -> (Block, Left) {
-        let channels = self.samples.channels.len();
-        let (mut block, mut left) = (Block::default(), Left::default());
-        block.reset(channels, channels);
-        let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
-        let counts = |e: &usize| e.is_multiple_of(self.options.stride) && self.thin.keeps(*e);
-        for entry in range.filter(counts) {
-            left.entries += 1;
-            let (wi, wo) = self.samples.measurement.directions.pair(entry);
-            if !(wi.z > 0.0 && wo.z > 0.0) {
-                left.below += 1;
-            } else if wi.z < self.least_cos || wo.z < self.least_cos {
-                left.beyond += 1;
-            } else if !self.values(entry, wi.z, &mut w, &mut y, &mut left) {
-                left.masked += 1;
-            } else if w.iter().all(|w| *w <= 0.0) {
-                left.weightless += 1;
-            } else {
-                block.index.push(entry as u32);
-                block.cos_i.push(wi.z);
-                block.x.push(self.kind.map_or(0.0, |k| k.lobe().coordinate(wi, wo)));
-                block.pairs.push(0.0);
-                block.w.iter_mut().zip(&w).for_each(|(list, w)| list.push(*w));
-                block.y.iter_mut().zip(&y).for_each(|(list, y)| list.push(*y));
-            }
-        }
-        (block, left)
-    }
-
-    /// Weights and values of an entry, channel by channel, 0 where masked; false where all are.
-    fn values(&self, entry: usize, cos_i: f64, w: &mut [f64], y: &mut [f64], left: &mut Left) -> bool {
-        let (samples, loss) = (self.samples, self.samples.loss);
-        let weight =
-            if self.solid_angle && !self.options.use_sigma { samples.measurement.weights.get(entry) } else { 1.0 };
-        let mut any = false;
-        for (c, &channel) in samples.channels.iter().enumerate() {
-            (w[c], y[c]) = (0.0, 0.0);
-            let Some(value) = samples.measurement.value(channel, entry) else { continue };
-            let datum = Datum { value, cos_i, epsilon: self.epsilon[c] };
-            if !loss.accepts(datum) {
-                left.refused += 1;
-                continue;
-            }
-            any = true;
-            y[c] = value;
-            w[c] = weight * if self.options.use_sigma { self.inverse_variance(entry, channel, datum) } else { 1.0 };
-        }
-        any
-    }
-
-    /// 1/σ_r² with σ_r = |∂r/∂y| σ at f = y; 0 where σ is no positive number.
-    fn inverse_variance(&self, entry: usize, channel: usize, datum: Datum) -> f64 {
-        let sigma = self.samples.measurement.sigma_plane(channel).map_or(f64::NAN, |s| s[entry]);
-        let sigma_r = sigma * self.samples.loss.data_slope(datum.value, datum);
-        if sigma > 0.0 && sigma_r > 0.0 && sigma_r.is_finite() { sigma_r.powi(-2) } else { 0.0 }
-    }
-}
+pub(in crate::fit) type Transforms = (Transform, Vec<f64>);

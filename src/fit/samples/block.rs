@@ -1,0 +1,127 @@
+//! Samples as lists, structure of arrays.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::numeric::simd::{Kernel, Simd};
+
+/// Samples in a row, structure of arrays. Lists by channel hold the channels of the fit, in its order.
+#[derive(Debug, Default, Clone)]
+pub(in crate::fit) struct Block {
+    /// Index of each sample in the measurement; left out for a table without σ.
+    pub index: Vec<u32>,
+    /// cosθi.
+    pub cos_i: Vec<f64>,
+    /// Coordinate of the lobes that have a shape.
+    pub x: Vec<f64>,
+    /// 1 where a sample is a neighbour of the one before, else 0.
+    pub pairs: Vec<f64>,
+    /// Normalised weight w, one list for all channels or one a channel; 0 where masked.
+    pub w: Vec<Vec<f64>>,
+    /// Measured value over [`Samples::scale`], one list a channel; 0 where masked.
+    pub y: Vec<Vec<f64>>,
+}
+
+impl Block {
+    pub fn reset(&mut self, lists: usize, channels: usize) {
+        self.index.clear();
+        self.cos_i.clear();
+        self.x.clear();
+        self.pairs.clear();
+        self.w.resize_with(lists, Vec::new);
+        self.y.resize_with(channels, Vec::new);
+        self.w.iter_mut().chain(&mut self.y).for_each(Vec::clear);
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Weights of one channel.
+    pub fn weight(&self, channel: usize) -> &[f64] {
+        if self.w.len() == 1 { &self.w[0] } else { &self.w[channel] }
+    }
+
+    /// The samples ordered by direction, so that neighbours stand together and the order of the file does not matter.
+    pub fn neighbours_together(&self, wi: &[DVec3], wo: &[DVec3]) -> Self {
+        let mut order: Vec<([i32; 4], u32)> = (0..self.len() as u32)
+            .into_par_iter()
+            .map(|k| {
+                let entry = self.index[k as usize] as usize;
+                let ([a, b], [c, d]) = (place(wi[entry]), place(wo[entry]));
+                ([a, b, c, d], k)
+            })
+            .collect();
+        order.par_sort_unstable();
+        let pick = |list: &Vec<f64>| order.iter().map(|(_, k)| list[*k as usize]).collect();
+        let index: Vec<u32> = order.iter().map(|(_, k)| self.index[*k as usize]).collect();
+        Self {
+            pairs: neighbours(&index, |a, b| {
+                wi[a].distance_squared(wi[b]) < SAME_INCIDENCE && wo[a].distance_squared(wo[b]) < FARTHEST
+            }),
+            index,
+            cos_i: pick(&self.cos_i),
+            x: pick(&self.x),
+            w: self.w.iter().map(pick).collect(),
+            y: self.y.iter().map(pick).collect(),
+        }
+    }
+
+    pub fn reserve(&mut self, samples: usize) {
+        self.index.reserve_exact(samples);
+        [&mut self.cos_i, &mut self.x, &mut self.pairs].into_iter().for_each(|l| l.reserve_exact(samples));
+        self.w.iter_mut().chain(&mut self.y).for_each(|l| l.reserve_exact(samples));
+    }
+
+    pub fn append(&mut self, other: &Self) {
+        self.index.extend_from_slice(&other.index);
+        self.cos_i.extend_from_slice(&other.cos_i);
+        self.x.extend_from_slice(&other.x);
+        self.pairs.extend_from_slice(&other.pairs);
+        let pairs = self.w.iter_mut().chain(&mut self.y).zip(other.w.iter().chain(&other.y));
+        pairs.for_each(|(list, more)| list.extend_from_slice(more));
+    }
+}
+
+/// Incidences closer than this (squared chord of the unit sphere) are the same.
+const SAME_INCIDENCE: f64 = 1e-8;
+/// Directions farther apart than this (squared chord, about 14°) are no neighbours.
+const FARTHEST: f64 = 0.0625;
+
+/// 1 for every entry that is `near` the one before.
+pub(super) fn neighbours(index: &[u32], near: impl Fn(usize, usize) -> bool) -> Vec<f64> {
+    let pair = |p: &[u32]| if near(p[0] as usize, p[1] as usize) { 1.0 } else { 0.0 };
+    std::iter::once(0.0).take(index.len()).chain(index.windows(2).map(pair)).collect()
+}
+
+/// A direction's polar ring and its place on it, coarse enough to overlook rounding.
+fn place(w: DVec3) -> [i32; 2] {
+    const STEPS: f64 = 1e5;
+    // The azimuth by the way round a square: monotone, and cheaper than an arctangent.
+    let size = w.x.abs() + w.y.abs();
+    let round = if size > 1e-9 { w.y / size } else { 0.0 };
+    let round = if w.x < 0.0 { 2.0 - round } else { round };
+    [(w.z * STEPS).round() as i32, (round * STEPS).round() as i32]
+}
+
+/// Values over their unit and their weights, both 0 where the value is masked.
+pub(super) struct Values<'a> {
+    pub unit: f64,
+    pub y: &'a mut [f64],
+    pub w: &'a mut [f64],
+}
+
+impl Kernel for Values<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _simd: S) {
+        for (w, y) in self.w.iter_mut().zip(&*self.y) {
+            *w = if y.is_nan() { 0.0 } else { *w };
+        }
+        for y in self.y {
+            *y = if y.is_nan() { 0.0 } else { *y * self.unit };
+        }
+    }
+}

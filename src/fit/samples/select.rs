@@ -1,0 +1,147 @@
+//! Which entries of a measurement count, one by one, and why the others don't.
+
+use std::ops::Range;
+
+use super::Samples;
+use super::block::Block;
+use crate::brdf::LobeKind;
+use crate::fit::loss::Datum;
+use crate::fit::options::{FitError, FitOptions};
+use crate::measurement::Measurement;
+
+/// Slack in the cosine that makes the angular limit inclusive whatever the rounding of the direction.
+const INCLUSIVE: f64 = 1e-12;
+
+pub(super) fn least_cos(options: &FitOptions) -> f64 {
+    options.max_angle_deg.to_radians().cos() - INCLUSIVE
+}
+
+/// Decides entry by entry.
+pub(super) struct Judge<'a> {
+    pub samples: &'a Samples<'a>,
+    pub options: &'a FitOptions,
+    pub least_cos: f64,
+    pub solid_angle: bool,
+    pub kind: Option<LobeKind>,
+    pub thin: Thin,
+    /// The relative loss's ε for the weights by σ, channel by channel: of all values, each counting for one.
+    pub epsilon: Vec<f64>,
+}
+
+/// Which entries of a measurement are looked at: of every `step` runs of `run` entries one, at a place that varies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::fit) struct Thin {
+    pub step: usize,
+    pub run: usize,
+}
+
+impl Thin {
+    /// All of them.
+    pub const NONE: Self = Self { step: 1, run: 1 };
+
+    fn keeps(self, entry: usize) -> bool {
+        let run = entry / self.run;
+        self.step == 1 || run % self.step == offset(run / self.step, self.step)
+    }
+}
+
+/// Which of the `step` entries of run `run` a thinned-out list keeps: spread evenly, without a beat with the grid's own period.
+pub(in crate::fit) fn offset(run: usize, step: usize) -> usize {
+    let golden = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+    ((golden * step as u64) >> 32) as usize
+}
+
+/// Entries left out, by reason.
+#[derive(Debug, Default)]
+pub(super) struct Left {
+    entries: usize,
+    below: usize,
+    beyond: usize,
+    masked: usize,
+    weightless: usize,
+    /// Values, not entries, that the loss can't take.
+    pub refused: usize,
+}
+
+impl Left {
+    pub fn add(&mut self, other: &Self) {
+        self.entries += other.entries;
+        self.below += other.below;
+        self.beyond += other.beyond;
+        self.masked += other.masked;
+        self.weightless += other.weightless;
+        self.refused += other.refused;
+    }
+
+    pub fn error(&self, measurement: &Measurement, max_angle_deg: f64) -> FitError {
+        FitError::NothingToFit {
+            name: measurement.name.clone(),
+            entries: self.entries,
+            below: self.below,
+            beyond: self.beyond,
+            masked: self.masked,
+            weightless: self.weightless,
+            max_angle_deg,
+        }
+    }
+}
+
+impl Judge<'_> {
+    /// The samples among these entries.
+    pub fn list(&self, range: Range<usize>) -> (Block, Left) {
+        let channels = self.samples.channels.len();
+        let (mut block, mut left) = (Block::default(), Left::default());
+        block.reset(channels, channels);
+        let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
+        let counts = |e: &usize| e.is_multiple_of(self.options.stride) && self.thin.keeps(*e);
+        for entry in range.filter(counts) {
+            left.entries += 1;
+            let (wi, wo) = self.samples.measurement.directions.pair(entry);
+            if !(wi.z > 0.0 && wo.z > 0.0) {
+                left.below += 1;
+            } else if wi.z < self.least_cos || wo.z < self.least_cos {
+                left.beyond += 1;
+            } else if !self.values(entry, wi.z, &mut w, &mut y, &mut left) {
+                left.masked += 1;
+            } else if w.iter().all(|w| *w <= 0.0) {
+                left.weightless += 1;
+            } else {
+                block.index.push(entry as u32);
+                block.cos_i.push(wi.z);
+                block.x.push(self.kind.map_or(0.0, |k| k.lobe().coordinate(wi, wo)));
+                block.pairs.push(0.0);
+                block.w.iter_mut().zip(&w).for_each(|(list, w)| list.push(*w));
+                block.y.iter_mut().zip(&y).for_each(|(list, y)| list.push(*y));
+            }
+        }
+        (block, left)
+    }
+
+    /// Weights and values of an entry, channel by channel, 0 where masked; false where all are.
+    fn values(&self, entry: usize, cos_i: f64, w: &mut [f64], y: &mut [f64], left: &mut Left) -> bool {
+        let (samples, loss) = (self.samples, self.samples.loss);
+        let weight =
+            if self.solid_angle && !self.options.use_sigma { samples.measurement.weights.get(entry) } else { 1.0 };
+        let mut any = false;
+        for (c, &channel) in samples.channels.iter().enumerate() {
+            (w[c], y[c]) = (0.0, 0.0);
+            let Some(value) = samples.measurement.value(channel, entry) else { continue };
+            let datum = Datum { value, cos_i, epsilon: self.epsilon[c] };
+            if !loss.accepts(datum) {
+                left.refused += 1;
+                continue;
+            }
+            any = true;
+            y[c] = value;
+            w[c] = weight * if self.options.use_sigma { self.inverse_variance(entry, channel, datum) } else { 1.0 };
+        }
+        any
+    }
+
+    /// 1/σ_r² with σ_r = |∂r/∂y| σ at f = y; 0 where σ is no positive number.
+    fn inverse_variance(&self, entry: usize, channel: usize, datum: Datum) -> f64 {
+        let sigma = self.samples.measurement.sigma_plane(channel).map_or(f64::NAN, |s| s[entry]);
+        let sigma_r = sigma * self.samples.loss.data_slope(datum.value, datum);
+        if sigma > 0.0 && sigma_r > 0.0 && sigma_r.is_finite() { sigma_r.powi(-2) } else { 0.0 }
+    }
+}
