@@ -94,9 +94,12 @@ impl MerlLines {
         // cosθi and cosθo are a ∓ b cosφd, so both reach `least_cos` where |cosφd| is at most a bound: a run about 90°.
         let (a, b) = (theta_h.1 * theta_d.1, theta_h.0 * theta_d.0);
         let inside = |cos: &f64| a - b * cos.abs() >= self.least_cos;
-        let cos_phi = &self.cos_phi[..MerlGrid::PHI_D];
-        let start = cos_phi.iter().position(inside)?;
-        let end = cos_phi.iter().rposition(inside)? + 1;
+        let (before, after) = self.cos_phi[..MerlGrid::PHI_D].split_at(MerlGrid::PHI_D / 2);
+        let start = before.partition_point(|cos| !inside(cos));
+        let end = before.len() + after.partition_point(inside);
+        if start == end {
+            return None;
+        }
         let first = line * MerlGrid::PHI_D + start;
         let weight = if self.solid_angle { MerlGrid::solid_angle(first) } else { 1.0 };
         Some(Line { first, bins: start..end, weight, theta_h, theta_d })
