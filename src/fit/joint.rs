@@ -15,6 +15,9 @@ const LARGEST: usize = 4_000_000;
 /// More parameters than this are not searched together.
 const MOST: usize = 60;
 
+/// Least eigenvalue of Newton's matrix, its diagonal scaled to 1, at which its step is trusted.
+const CLEARLY_POSITIVE: f64 = 1e-9;
+
 /// How far a descent goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Digits {
@@ -49,8 +52,9 @@ pub(super) fn polish(
     let joint = Joint { problem, dense };
     let ranges = problem.ranges.iter().flatten().chain(&problem.bounds).copied().collect();
     let (ftol, polish) = match digits {
-        Digits::Rough => (1e-9, 60),
-        Digits::All => (1e-15, 60),
+        Digits::Rough => (1e-9, 0),
+        // On large tables a step takes a pass, and Newton's doubles the digits.
+        Digits::All => (1e-15, if dense { 60 } else { 12 }),
     };
     let options = SolverOptions { rank_tol: 1e-14, ftol, polish, ..SolverOptions::default() };
     let lm = LevenbergMarquardt::new(options).with_bounds(ranges);
@@ -67,21 +71,51 @@ impl Joint<'_> {
         Solution { lobes: self.problem.shaped(&t), t, weights, cost }
     }
 
+    /// By Newton's matrix, which follows a loss's own curvature, where it is positive; else by Gauss and Newton's, which always is.
     fn by_normal(&self, at: &Solution) -> Linearization {
-        let parameters = at.weights.len() * self.problem.kinds.len() + self.problem.layout.len();
-        let sums = passes::sums(self.problem.samples, &at.lobes, &at.weights, self.problem.saturation, Want::All);
+        let (cost, normal, gradient) = self.newton(at).unwrap_or_else(|| self.assembled(at, Want::All));
+        Linearization::from_normal(cost, normal, &gradient)
+    }
+
+    /// Cost, Newton's matrix without the lobes' own second slopes by their shapes, and half the gradient. `None` for a linear loss, which
+    /// has nothing to gain, and where the matrix is not clearly positive.
+    fn newton(&self, at: &Solution) -> Option<(f64, DMatrix<f64>, DVector<f64>)> {
+        let problem = self.problem;
+        if problem.samples.loss.is_linear() && problem.saturation.is_none() {
+            return None;
+        }
+        let sums = self.assembled(at, Want::Newton);
+        let diagonal = sums.1.diagonal();
+        let root = diagonal.map(f64::sqrt);
+        let scaled = sums.1.map_with_location(|i, j, x| x / (root[i] * root[j]));
+        let positive = diagonal.iter().all(|d| *d > 0.0) && scaled.iter().all(|x| x.is_finite());
+        (positive && scaled.symmetric_eigenvalues().min() > CLEARLY_POSITIVE).then_some(sums)
+    }
+
+    /// Cost, normal matrix and half the gradient from one pass.
+    fn assembled(&self, at: &Solution, want: Want) -> (f64, DMatrix<f64>, DVector<f64>) {
+        let problem = self.problem;
+        let (channels, lobes) = (at.weights.len(), problem.kinds.len());
+        let parameters = channels * lobes + problem.layout.len();
+        let sums = passes::sums(problem.samples, &at.lobes, &at.weights, problem.saturation, want);
         let (mut normal, mut gradient) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
         for (c, sums) in sums.iter().enumerate() {
-            let (place, strength) = (self.problem.place(at.weights.len(), c), self.problem.strength(&at.weights[c]));
+            let (place, strength) = (problem.place(channels, c), problem.strength(&at.weights[c]));
             for (i, &a) in place.iter().enumerate() {
                 gradient[a] += strength[i] * sums.gradient[i];
-                place
-                    .iter()
-                    .enumerate()
-                    .for_each(|(j, &b)| normal[(a, b)] += strength[i] * strength[j] * sums.normal[(i, j)]);
+                let row = place.iter().zip(&strength).enumerate();
+                row.for_each(|(j, (&b, other))| normal[(a, b)] += strength[i] * other * sums.normal[(i, j)]);
+            }
+            if want == Want::Newton {
+                // A lobe's slope is times its weight: ∂²f by both is the bare slope.
+                for (i, (lobe, _)) in problem.layout.iter().enumerate() {
+                    let (a, b) = (c * lobes + lobe, channels * lobes + i);
+                    normal[(a, b)] += sums.gradient[lobes + i];
+                    normal[(b, a)] += sums.gradient[lobes + i];
+                }
             }
         }
-        Linearization::from_normal(sums.iter().map(|s| s.cost).sum(), normal, &gradient)
+        (sums.iter().map(|s| s.cost).sum(), normal, gradient)
     }
 
     /// Residuals and Jacobian of every value, robust weights as of here.

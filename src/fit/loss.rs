@@ -92,6 +92,17 @@ impl Loss {
         }
     }
 
+    /// ∂²r/∂f² where ∂r/∂f is `slope`.
+    #[inline(always)]
+    pub(super) fn second_slope(self, slope: f64, cos_i: f64) -> f64 {
+        match self {
+            Self::L2 | Self::CosineL2 | Self::Relative => 0.0,
+            Self::Log => -slope * slope,
+            // The slope is c/(3 ∛(c f)²).
+            Self::CubeRoot => -2.0 * slope * slope / (cos_i / (3.0 * slope)).sqrt(),
+        }
+    }
+
     /// |∂r/∂y| at the model's value `f`: how far an error of the measured value moves the residual. ε counts as a constant.
     #[must_use]
     pub fn data_slope(self, f: f64, datum: Datum) -> f64 {
@@ -257,6 +268,18 @@ mod tests {
         }
     }
 
+    /// ∂r/∂f likewise.
+    fn complex_slope(loss: Loss, f: C, y: f64, c: f64, epsilon: f64) -> C {
+        let one = C::new(1.0, 0.0);
+        match loss {
+            Loss::L2 => one,
+            Loss::CosineL2 => one * c,
+            Loss::Log => one * c / (one + f * c),
+            Loss::CubeRoot => ((f * c).ln() * (-2.0 / 3.0)).exp() * (c / 3.0),
+            Loss::Relative => one / (y + epsilon),
+        }
+    }
+
     const STEP: f64 = 1e-30;
 
     #[test]
@@ -273,6 +296,9 @@ mod tests {
                     assert!((loss.residual(f, datum) - r).abs() <= 1e-13 * size, "{loss:?} {f} {y}");
                     let slope = at(real + h, C::new(y, 0.0)).im / STEP;
                     assert!((loss.slope(f, datum) / slope - 1.0).abs() < 1e-9, "{loss:?} {f} {y}");
+                    let second = complex_slope(loss, real + h, y, c, datum.epsilon).im / STEP;
+                    let got = loss.second_slope(loss.slope(f, datum), c);
+                    assert!((got - second).abs() <= 1e-9 * second.abs(), "{loss:?} {f} {y}: {got:e} {second:e}");
                     let data = at(real, C::new(y, STEP)).im / STEP;
                     // The complex quotient cancels where f ≪ y.
                     let bound = 1e-9 * data.abs() + 1e-15 / (y + 1e-4);

@@ -107,6 +107,22 @@ impl Scratch {
         }
     }
 
+    /// Fills the weight with the slope of the pull by f: what Newton's method weighs products by. Negative where the loss bends down.
+    pub fn bend(&mut self, block: &Block, channel: usize, loss: Loss, saturation: Saturation) {
+        self.weight.resize(block.len(), 0.0);
+        let Self { r, slope, trust, weight, .. } = self;
+        vectorised(Bend {
+            loss,
+            saturation,
+            w: block.weight(channel),
+            cos_i: &block.cos_i,
+            r,
+            slope,
+            trust,
+            to: weight,
+        });
+    }
+
     /// Fills the weight with the squared pull.
     pub fn squared_pull(&mut self) {
         self.weight.clear();
@@ -245,6 +261,8 @@ pub(super) enum Want {
     Weights,
     /// The normal matrix by weights and shapes.
     All,
+    /// As All, with the true slope of the pull by f in place of its Gauss–Newton part.
+    Newton,
 }
 
 /// One pass over true residuals for given shapes and weights (`weights[channel][lobe]`).
@@ -268,7 +286,10 @@ pub(super) fn sums(
             for (sums, (c, x)) in sums.iter_mut().zip(weights.iter().enumerate()) {
                 sums.cost += scratch.residuals(samples, block, c, x, saturation);
                 if matrix > 0 {
-                    scratch.curvature(block, c);
+                    match want {
+                        Want::Newton => scratch.bend(block, c, samples.loss, saturation),
+                        _ => scratch.curvature(block, c),
+                    }
                     scratch.tally(columns, &mut sums.gradient, &mut sums.normal);
                 } else {
                     let (columns, on) = (&scratch.columns[..columns], &scratch.pull[..]);
@@ -452,6 +473,44 @@ impl Evaluate<'_> {
             pull[i] = w[i] * trust[i] * slope[i] * r[i];
         }
         cost
+    }
+}
+
+/// w (ρ′ + 2uρ″) (∂r/∂f)² + w ρ′ r ∂²r/∂f².
+struct Bend<'a> {
+    loss: Loss,
+    saturation: Saturation,
+    w: &'a [f64],
+    cos_i: &'a [f64],
+    r: &'a [f64],
+    slope: &'a [f64],
+    trust: &'a [f64],
+    to: &'a mut [f64],
+}
+
+impl Kernel for Bend<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _simd: S) {
+        match self.saturation {
+            None => self.each(|_| 1.0),
+            Some((RobustKind::Huber, s)) => self.each(|r| RobustKind::Huber.rho(r * r / (s * s)).2),
+            Some((RobustKind::Cauchy, s)) => self.each(|r| RobustKind::Cauchy.rho(r * r / (s * s)).2),
+        }
+    }
+}
+
+impl Bend<'_> {
+    #[inline(always)]
+    fn each(self, growth: impl Fn(f64) -> f64) {
+        let n = self.to.len();
+        let (w, cos_i, r) = (&self.w[..n], &self.cos_i[..n], &self.r[..n]);
+        let (slope, trust, to) = (&self.slope[..n], &self.trust[..n], &mut self.to[..n]);
+        for i in 0..n {
+            let second = trust[i] * r[i] * self.loss.second_slope(slope[i], cos_i[i]);
+            to[i] = w[i] * slope[i].mul_add(slope[i] * growth(r[i]), second);
+        }
     }
 }
 

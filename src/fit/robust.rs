@@ -16,7 +16,7 @@ const ROUNDS: usize = 60;
 /// Relative change at which s has settled, on small tables, on others, where each round takes passes and the parameters' own errors are far
 /// larger, and on the part of the samples that says where to begin.
 const SETTLED: f64 = 1e-12;
-const SETTLED_LARGE: f64 = 1e-5;
+const SETTLED_LARGE: f64 = 1e-7;
 const SETTLED_PART: f64 = 1e-3;
 /// Most that s shrinks in a round: the parameters must be able to follow.
 const SHRINK: f64 = 0.25;
