@@ -1,0 +1,235 @@
+//! What 32-bit arithmetic would gain and cost: one pass of the sums a fit of Lambert + Phong needs (Gram matrix of three columns, data of
+//! three channels) over 909,696 samples, in 64 bits, in 32 bits with the data stored so, and in 32 bits from data stored in 64, as a
+//! table is. `cargo bench --bench precision` prints a Markdown table.
+#![allow(clippy::expect_used)] // a bench may fail loudly
+
+use std::time::Instant;
+
+use goniofit::numeric::random::{Purpose, RngExt, stream};
+use goniofit::numeric::simd::{Kernel, Simd, exp, vectorised};
+use rayon::prelude::*;
+
+const SAMPLES: usize = 909_696;
+const BLOCK: usize = 1024;
+const CHANNELS: usize = 3;
+const ROUNDS: usize = 40;
+const EXPONENT: f64 = 89.0;
+/// Σ w a b of the columns a, b in (1, φ, xφ), then Σ w a y of every channel.
+const SUMS: usize = 6 + 3 * CHANNELS;
+
+type Sums = [f64; SUMS];
+
+struct Table<T> {
+    x: Vec<T>,
+    w: Vec<T>,
+    y: [Vec<T>; CHANNELS],
+}
+
+fn main() {
+    let table = made();
+    let single = Table {
+        x: narrowed(&table.x),
+        w: narrowed(&table.w),
+        y: [narrowed(&table.y[0]), narrowed(&table.y[1]), narrowed(&table.y[2])],
+    };
+    let energy: f64 = table.y.iter().flatten().zip(table.w.iter().cycle()).map(|(y, w)| w * y * y).sum();
+    let exact = cost(&in_double(&table), energy);
+    println!("| arithmetic | data in memory | ms a pass | relative error of the cost |");
+    println!("|---|---|---|---|");
+    let row = |name: &str, stored: &str, pass: &dyn Fn() -> Sums| {
+        let quickest = (0..ROUNDS).map(|_| timed(pass)).fold(f64::INFINITY, f64::min);
+        println!("| {name} | {stored} | {quickest:.2} | {:.0e} |", (cost(&pass(), energy) / exact - 1.0).abs());
+    };
+    row("64 bits", "64 bits", &|| in_double(&table));
+    row("32 bits", "32 bits", &|| in_single(&single.x, &single.w, &single.y));
+    row("32 bits", "64 bits", &|| converted(&table));
+}
+
+fn timed(pass: &dyn Fn() -> Sums) -> f64 {
+    let clock = Instant::now();
+    std::hint::black_box(pass());
+    1e3 * clock.elapsed().as_secs_f64()
+}
+
+/// Coordinates as dense near the peak as a MERL table's, a lobe over a diffuse ground, 1 % noise.
+fn made() -> Table<f64> {
+    let mut rng = stream(1, Purpose::Study, 1);
+    let x: Vec<f64> = (0..SAMPLES).map(|_| (1.0 - 0.999 * rng.random::<f64>().powi(2)).ln()).collect();
+    let value = |x: &f64, noise: f64| (0.1 + 0.4 * (EXPONENT * x).exp()) * (1.0 + 0.01 * (noise - 0.5));
+    let y = [0, 1, 2].map(|_| x.iter().map(|x| value(x, rng.random())).collect());
+    let w = (0..SAMPLES).map(|_| 0.5 + rng.random::<f64>()).collect();
+    Table { x, w, y }
+}
+
+fn narrowed(list: &[f64]) -> Vec<f32> {
+    list.iter().map(|v| *v as f32).collect()
+}
+
+/// The reduced cost of the linear weights, from the sums.
+fn cost(sums: &Sums, energy: f64) -> f64 {
+    let gram = nalgebra::Matrix2::new(sums[0], sums[1], sums[1], sums[2]);
+    let inverse = gram.try_inverse().expect("two different columns");
+    let explained = |c: usize| {
+        let b = nalgebra::Vector2::new(sums[6 + 3 * c], sums[7 + 3 * c]);
+        b.dot(&(inverse * b))
+    };
+    energy - (0..CHANNELS).map(explained).sum::<f64>()
+}
+
+fn blocks(block: impl Fn(std::ops::Range<usize>) -> Sums + Sync + Send) -> Sums {
+    let parts: Vec<Sums> = (0..SAMPLES.div_ceil(BLOCK))
+        .into_par_iter()
+        .map(|b| block(b * BLOCK..((b + 1) * BLOCK).min(SAMPLES)))
+        .collect();
+    parts.iter().fold([0.0; SUMS], |sum, part| std::array::from_fn(|k| sum[k] + part[k]))
+}
+
+fn in_double(table: &Table<f64>) -> Sums {
+    blocks(|r| {
+        vectorised(Double {
+            x: &table.x[r.clone()],
+            w: &table.w[r.clone()],
+            y: table.y.each_ref().map(|y| &y[r.clone()]),
+        })
+    })
+}
+
+fn in_single(x: &[f32], w: &[f32], y: &[Vec<f32>; CHANNELS]) -> Sums {
+    blocks(|r| vectorised(Single { x: &x[r.clone()], w: &w[r.clone()], y: y.each_ref().map(|y| &y[r.clone()]) }))
+}
+
+fn converted(table: &Table<f64>) -> Sums {
+    blocks(|r| {
+        vectorised(Converted {
+            x: &table.x[r.clone()],
+            w: &table.w[r.clone()],
+            y: table.y.each_ref().map(|y| &y[r.clone()]),
+        })
+    })
+}
+
+struct Double<'a> {
+    x: &'a [f64],
+    w: &'a [f64],
+    y: [&'a [f64]; CHANNELS],
+}
+
+impl Kernel for Double<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Sums {
+        let mut phi = [0.0; BLOCK];
+        phi.iter_mut().zip(self.x).for_each(|(p, x)| *p = exp(EXPONENT * x));
+        let mut sums = [simd.splat_f64s(0.0); SUMS];
+        let lists =
+            [self.x, self.w, self.y[0], self.y[1], self.y[2], &phi[..self.x.len()]].map(|l| S::as_simd_f64s(l).0);
+        for i in 0..lists[0].len() {
+            let [x, w, y0, y1, y2, phi] = lists.map(|l| l[i]);
+            let (a, b) = (simd.mul_f64s(w, phi), simd.mul_f64s(x, phi));
+            let c = simd.mul_f64s(w, b);
+            let terms = [
+                (w, simd.splat_f64s(1.0)),
+                (a, simd.splat_f64s(1.0)),
+                (a, phi),
+                (c, simd.splat_f64s(1.0)),
+                (c, phi),
+                (c, b),
+                (w, y0),
+                (a, y0),
+                (c, y0),
+                (w, y1),
+                (a, y1),
+                (c, y1),
+                (w, y2),
+                (a, y2),
+                (c, y2),
+            ];
+            for (sum, (p, q)) in sums.iter_mut().zip(terms) {
+                *sum = simd.mul_add_f64s(p, q, *sum);
+            }
+        }
+        sums.map(|s| simd.reduce_sum_f64s(s))
+    }
+}
+
+struct Single<'a> {
+    x: &'a [f32],
+    w: &'a [f32],
+    y: [&'a [f32]; CHANNELS],
+}
+
+impl Kernel for Single<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Sums {
+        let mut phi = [0.0f32; BLOCK];
+        phi.iter_mut().zip(self.x).for_each(|(p, x)| *p = exp_single(EXPONENT as f32 * x));
+        let mut sums = [simd.splat_f32s(0.0); SUMS];
+        let lists =
+            [self.x, self.w, self.y[0], self.y[1], self.y[2], &phi[..self.x.len()]].map(|l| S::as_simd_f32s(l).0);
+        for i in 0..lists[0].len() {
+            let [x, w, y0, y1, y2, phi] = lists.map(|l| l[i]);
+            let (a, b) = (simd.mul_f32s(w, phi), simd.mul_f32s(x, phi));
+            let c = simd.mul_f32s(w, b);
+            let terms = [
+                (w, simd.splat_f32s(1.0)),
+                (a, simd.splat_f32s(1.0)),
+                (a, phi),
+                (c, simd.splat_f32s(1.0)),
+                (c, phi),
+                (c, b),
+                (w, y0),
+                (a, y0),
+                (c, y0),
+                (w, y1),
+                (a, y1),
+                (c, y1),
+                (w, y2),
+                (a, y2),
+                (c, y2),
+            ];
+            for (sum, (p, q)) in sums.iter_mut().zip(terms) {
+                *sum = simd.mul_add_f32s(p, q, *sum);
+            }
+        }
+        sums.map(|s| f64::from(simd.reduce_sum_f32s(s)))
+    }
+}
+
+/// [`Single`] after narrowing the block.
+struct Converted<'a> {
+    x: &'a [f64],
+    w: &'a [f64],
+    y: [&'a [f64]; CHANNELS],
+}
+
+impl Kernel for Converted<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Sums {
+        let n = self.x.len();
+        let mut lists = [[0.0f32; BLOCK]; 2 + CHANNELS];
+        for (to, from) in lists.iter_mut().zip([self.x, self.w, self.y[0], self.y[1], self.y[2]]) {
+            to.iter_mut().zip(from).for_each(|(to, v)| *to = *v as f32);
+        }
+        let [x, w, y0, y1, y2] = &lists;
+        Single { x: &x[..n], w: &w[..n], y: [&y0[..n], &y1[..n], &y2[..n]] }.run(simd)
+    }
+}
+
+/// eˣ to two units in the last place for −87 < x < 88; below, e⁻⁸⁷.
+#[inline(always)]
+fn exp_single(x: f32) -> f32 {
+    let x = if x < -87.0 { -87.0 } else { x };
+    let rounded = x.mul_add(std::f32::consts::LOG2_E, 12_582_912.0);
+    let k = rounded - 12_582_912.0;
+    let r = k.mul_add(-1.428_606_8e-6, k.mul_add(-0.693_145_75, x));
+    let mut p = 1.0 / 720.0f32;
+    for c in [1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
+        p = p.mul_add(r, c);
+    }
+    f32::from_bits(p.to_bits().wrapping_add(rounded.to_bits() << 23))
+}
