@@ -182,19 +182,16 @@ pub(super) struct Search<'a> {
     pub transform: &'a Transform,
     /// Σ w g² y² of each channel.
     pub energy: &'a [f64],
-    /// The transforms' sums over all samples.
-    totals: Vec<f64>,
 }
 
 impl<'a> Search<'a> {
     pub fn new(problem: &'a Problem<'a>, transform: &'a Transform, energy: &'a [f64]) -> Self {
-        let measures = problem.samples.lists() + problem.samples.channels.len();
-        Self { problem, transform, energy, totals: (0..measures).map(|m| transform.total(m)).collect() }
+        Self { problem, transform, energy }
     }
 
     /// The same samples under other bounds.
     pub fn of<'b>(&'b self, problem: &'b Problem<'b>) -> Search<'b> {
-        Search { problem, transform: self.transform, energy: self.energy, totals: self.totals.clone() }
+        Search { problem, transform: self.transform, energy: self.energy }
     }
 
     /// Gram matrices and data vectors at `lobes`, with the slopes by t on request.
@@ -208,7 +205,7 @@ impl<'a> Search<'a> {
         // A lobe alone: its products with constants, and with the data.
         for (a, lobe) in columns.lobes.iter().enumerate() {
             let jets = match lobe.exponent {
-                None => self.totals.iter().map(|t| [*t, 0.0, 0.0]).collect(),
+                None => self.transform.totals.iter().map(|t| [*t, 0.0, 0.0]).collect(),
                 Some(n) => self.transform.at(n, 0..lists + channels),
             };
             let constants = columns.lobes.iter().enumerate().filter(|(_, other)| other.exponent.is_none());
