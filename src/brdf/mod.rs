@@ -19,6 +19,7 @@ pub use file::{
 };
 pub use lobe::{Lobe, LobeKind, Parameter};
 pub use material::{LobeTerm, Material, PerChannel, Reflectance};
+pub(crate) use spec::MAX_LOBES;
 pub use spec::{ModelSpec, SpecError};
 
 use glam::DVec3;

@@ -6,11 +6,11 @@
 
 use nalgebra::DVector;
 
+use super::bins::Bins;
 use super::merl_lines::{Line, MerlLines, ln_cosines};
 use super::passes::{Scratch, ShapedLobe};
 use super::samples::Samples;
 use super::structure::PairSums;
-use super::transform::Transform;
 use crate::measurement::MerlGrid;
 use crate::numeric::simd::{Eight, Kernel, LANES, Lanes, Simd, vectorised};
 
@@ -162,7 +162,7 @@ type Spare = [Row; 2];
 /// Sums over a run of lines for the transforms of a linear loss; `M` channels that share one mask.
 pub(super) struct Gathered<const M: usize> {
     /// Measures: w g², then w g² y of every channel.
-    pub transform: Transform,
+    pub bins: Bins,
     seen: SeenLanes<M>,
     line: FoldedLine,
     spare: [Spare; M],
@@ -213,7 +213,7 @@ impl<const M: usize> Gathered<M> {
     pub fn new() -> Self {
         let zero = [0.0; LANES];
         Self {
-            transform: Transform::new(1 + M),
+            bins: Bins::new(1 + M),
             seen: SeenLanes { count: zero, weight: zero, energy: [zero; M], largest: zero, unlike: zero },
             line: FoldedLine::default(),
             spare: [[[0.0; ROOM]; 2]; M],
@@ -223,11 +223,11 @@ impl<const M: usize> Gathered<M> {
 
     /// Adds a line of the channels' planes.
     pub fn add(&mut self, lines: &MerlLines, line: &Line, planes: [&[f64]; M], cosine: bool) {
-        let Self { transform, seen, line: folded, spare, measures } = self;
+        let Self { bins, seen, line: folded, spare, measures } = self;
         planes.iter().for_each(|plane| touch(plane, line.entries()));
         folded.set(lines, line, cosine);
         vectorised(Measure { line: folded, planes, spare, sums: measures, seen });
-        transform.absorb(&folded.x[..folded.fold.near], measures);
+        bins.absorb(&folded.x[..folded.fold.near], measures);
     }
 
     pub fn seen(&self) -> Seen<M> {

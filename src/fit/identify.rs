@@ -18,7 +18,7 @@ pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &mut Un
     let cost = |held: &Problem<'_>, t: Vec<f64>| {
         let search = search.of(held);
         let lm = LevenbergMarquardt::new(options()).with_bounds(held.bounds.clone());
-        solver::minimize(&search, lm, DVector::from_vec(t), 30).map_or(f64::INFINITY, |found| found.cost)
+        solver::minimize(search.walk(), lm, DVector::from_vec(t), 30).map_or(f64::INFINITY, |found| found.cost)
     };
     let least = search.solve(&at.t).cost.max(0.0);
     mark(search.problem, at, uncertainty, least, resolved, cost);

@@ -90,7 +90,7 @@ impl Profile<'_> {
         let search = self.search.of(&held);
         let options = SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() };
         let lm = LevenbergMarquardt::new(options).with_bounds(held.bounds.clone());
-        let found = solver::minimize(&search, lm, start, 30);
+        let found = solver::minimize(search.walk(), lm, start, 30);
         found.map_or(f64::NAN, |f| (f.cost - self.at.cost.max(0.0)) / self.rise - 1.0)
     }
 

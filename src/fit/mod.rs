@@ -6,6 +6,7 @@
 //! over the data compresses: after it, a cost with its derivatives takes microseconds. So no start value is needed: the whole range is
 //! searched.
 
+mod bins;
 mod bootstrap;
 mod budget;
 mod choose;

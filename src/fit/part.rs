@@ -91,7 +91,7 @@ pub(super) fn refit(
         let search = Search::new(&problem, &transform, &energy);
         let start = DVector::from_column_slice(&like.solution.t);
         let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
-        let found = solver::minimize(&search, lm, start, options.max_iterations).map_err(failed)?;
+        let found = solver::minimize(search.walk(), lm, start, options.max_iterations).map_err(failed)?;
         return Ok(search.solve(found.t.as_slice()));
     }
     Ok(descend_shapes(&problem, &like.solution, options.max_iterations)?.0)

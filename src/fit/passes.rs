@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::bins::Bins;
 use super::folded::{OnLines, Products, Residuals};
 use super::loss::{Loss, RobustKind};
 use super::merl_lines::{Line, MerlLines};
@@ -186,30 +187,40 @@ fn omega(samples: &Samples<'_>, block: &Block) -> Vec<Vec<f64>> {
     (0..samples.lists()).map(of).collect()
 }
 
+/// What the transforms are of, over a block: the weights w g² of a linear loss, list by list, then the weighted data w g² y, channel by
+/// channel. Adds each channel's Σ w g² y² to `energy`.
+fn measures(samples: &Samples<'_>, block: &Block, energy: &mut [f64]) -> Vec<Vec<f64>> {
+    let mut values = omega(samples, block);
+    let lists = values.len();
+    for (c, energy) in energy.iter_mut().enumerate() {
+        let weight = &values[if lists == 1 { 0 } else { c }];
+        let wy: Vec<f64> = weight.iter().zip(&block.y[c]).map(|(w, y)| w * y).collect();
+        *energy += dot_vectorised(&wy, &block.y[c]);
+        values.push(wy);
+    }
+    values
+}
+
 /// The transforms of a linear loss's weights and weighted data (measures: lists, then channels), and each channel's energy
 /// Σ w g² y².
 pub(super) fn transform(samples: &Samples<'_>) -> Transforms {
-    // Each piece has its own sums: few enough that adding them costs nothing, and as many whatever the number of threads.
     let (lists, channels) = (samples.lists(), samples.channels.len());
-    let parts = samples.map_pieces(
-        || (Transform::new(lists + channels), vec![0.0; channels]),
-        |sums, block| {
-            let mut values = omega(samples, block);
-            for c in 0..channels {
-                let weight = &values[if lists == 1 { 0 } else { c }];
-                let wy: Vec<f64> = weight.iter().zip(&block.y[c]).map(|(w, y)| w * y).collect();
-                sums.1[c] += dot_vectorised(&wy, &block.y[c]);
-                values.push(wy);
-            }
-            sums.0.absorb(&block.x, &values);
-        },
-    );
-    let mut total = (Transform::new(lists + channels), vec![0.0; channels]);
-    for (part, energy) in &parts {
-        total.0.merge(part);
-        total.1.iter_mut().zip(energy).for_each(|(t, e)| *t += e);
+    if let Some(all) = samples.single_block().filter(|all| Transform::are_few(&all.x)) {
+        let mut energy = vec![0.0; channels];
+        let values = measures(samples, all, &mut energy);
+        return (Transform::of_samples(&all.x, &values), energy);
     }
-    total
+    // Each piece has its own sums: few enough that adding them costs nothing, and as many whatever the number of threads.
+    let parts = samples.map_pieces(
+        || (Bins::new(lists + channels), vec![0.0; channels]),
+        |(bins, energy), block| bins.absorb(&block.x, &measures(samples, block, energy)),
+    );
+    let (mut bins, mut total) = (Bins::new(lists + channels), vec![0.0; channels]);
+    for (part, energy) in &parts {
+        bins.merge(part);
+        total.iter_mut().zip(energy).for_each(|(t, e)| *t += e);
+    }
+    (Transform::of_bins(&bins), total)
 }
 
 /// The quadratic model of one channel's cost about given weights and shapes, by [weights, t of every shape parameter]. The slopes are

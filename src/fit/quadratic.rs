@@ -1,10 +1,17 @@
 //! The weights of given shapes: the smallest value of a quadratic in at most four unknowns, within their ranges and, on request,
-//! with a bounded sum.
+//! with a bounded sum. A search solves some hundred thousands of them, so they stand on the stack.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+
+use crate::brdf::MAX_LOBES;
 
 /// Eigenvalues of the scaled matrix below this share of the largest count as 0: a few dozen roundings of its entries.
 const RANK: f64 = 1e-14;
+/// A matrix of columns of length 1 with a pivot below this is nearly singular.
+const LEAST_PIVOT: f64 = 1e-8;
+
+/// A number for each unknown, 0 beyond the last.
+pub(super) type Row = [f64; MAX_LOBES];
 
 /// Where the unknowns may lie.
 #[derive(Debug, Clone)]
@@ -18,71 +25,180 @@ pub(super) struct Feasible<'a> {
 /// Where an unknown stands at the minimum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stand {
-    Free,
     Low,
+    Free,
     High,
 }
 
-/// The x within `feasible` that minimises xᵀGx − 2bᵀx, for a symmetric positive semi-definite G. Every set of unknowns at the
-/// ends of their ranges is tried, so the minimum is global. Undetermined directions get the minimum-norm solution (columns
-/// scaled to unit norm). NaN in, NaN out.
-pub(super) fn minimise(gram: &DMatrix<f64>, b: &DVector<f64>, feasible: &Feasible<'_>) -> DVector<f64> {
-    if gram.iter().chain(b).any(|v| v.is_nan()) {
-        return DVector::repeat(b.len(), f64::NAN);
+/// xᵀGx − 2bᵀx, for a symmetric positive semi-definite G.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Quadratic {
+    n: usize,
+    gram: [Row; MAX_LOBES],
+    b: Row,
+}
+
+impl Quadratic {
+    /// In `n` unknowns.
+    pub fn new(n: usize, gram: impl Fn(usize, usize) -> f64, b: impl Fn(usize) -> f64) -> Self {
+        let row = |of: &dyn Fn(usize) -> f64| -> Row { std::array::from_fn(|j| if j < n { of(j) } else { 0.0 }) };
+        let gram = std::array::from_fn(|i| if i < n { row(&|j| gram(i, j)) } else { Row::default() });
+        Self { n, gram, b: row(&b) }
     }
-    // Where all may be free that is the minimum; of equal minima it has the smallest norm.
-    let free = solve_free(gram, b);
-    if feasible.holds(&free) && !feasible.pinned() {
-        return free;
+
+    /// xᵀGx − 2bᵀx.
+    pub fn value(&self, x: &Row) -> f64 {
+        (0..self.n).map(|i| x[i] * (dot(&self.gram[i], x) - 2.0 * self.b[i])).sum()
     }
-    let value = |x: &DVector<f64>| x.dot(&(gram * x)) - 2.0 * x.dot(b);
-    let mut best: Option<(f64, DVector<f64>)> = None;
-    for stands in feasible.stands() {
-        for capped in [false, true] {
-            let Some(x) = stationary(gram, b, feasible, &stands, capped).filter(|x| feasible.holds(x)) else {
-                continue;
-            };
-            let value = value(&x);
-            if best.as_ref().is_none_or(|(least, _)| value < *least) {
-                best = Some((value, x));
+
+    /// The x within `feasible` that minimises it. Every set of unknowns at the ends of their ranges is tried, so the minimum is
+    /// global. Undetermined directions get the minimum-norm solution (columns scaled to unit norm). NaN in, NaN out.
+    pub fn minimise(&self, feasible: &Feasible<'_>) -> Row {
+        if self.gram.iter().flatten().chain(&self.b).any(|v| v.is_nan()) {
+            return [f64::NAN; MAX_LOBES];
+        }
+        // Where all may be free that is the minimum; of equal minima it has the smallest norm.
+        let free = self.solve();
+        if feasible.holds(&free) && !feasible.pinned() {
+            return free;
+        }
+        let mut best: Option<(f64, Row)> = None;
+        let mut stands = [Stand::Low; MAX_LOBES];
+        loop {
+            for sum in [None, feasible.cap].into_iter().take(if feasible.cap.is_some() { 2 } else { 1 }) {
+                let Some(x) = self.stationary(feasible, stands, sum).filter(|x| feasible.holds(x)) else { continue };
+                let value = self.value(&x);
+                if best.as_ref().is_none_or(|(least, _)| value < *least) {
+                    best = Some((value, x));
+                }
+            }
+            if !feasible.next(&mut stands) {
+                break;
             }
         }
+        // Rounding may leave no candidate exactly inside: the nearest point of the box serves.
+        let low = |i: usize| feasible.ranges.get(i).map_or(0.0, |range| range.0);
+        best.map_or_else(|| std::array::from_fn(|i| free[i].max(low(i))), |(_, x)| x)
     }
-    // Rounding may leave no candidate exactly inside: the nearest point of the box serves.
-    best.map_or_else(|| free.zip_map(&feasible.lows(), f64::max), |(_, x)| x)
+
+    /// The stationary point with the unknowns where `stands` says, and of that `sum` on request.
+    fn stationary(&self, feasible: &Feasible<'_>, stands: [Stand; MAX_LOBES], sum: Option<f64>) -> Option<Row> {
+        let mut x = Row::default();
+        for (i, (low, high)) in feasible.ranges.iter().enumerate() {
+            x[i] = match stands[i] {
+                Stand::Low => *low,
+                Stand::High => *high,
+                Stand::Free => 0.0,
+            };
+        }
+        let is_free = |i: usize| stands[i] == Stand::Free;
+        if sum.is_some() && !(0..self.n).any(is_free) {
+            return None;
+        }
+        let rest = |i: usize| self.b[i] - dot(&self.gram[i], &x);
+        let solved = self.with(rest).solve_on_plane(is_free, sum.map(|sum| sum - x.iter().sum::<f64>()))?;
+        (0..self.n).filter(|&i| is_free(i)).for_each(|i| x[i] = solved[i]);
+        Some(x)
+    }
+
+    /// The same matrix with another b.
+    pub fn with(&self, b: impl Fn(usize) -> f64) -> Self {
+        Self { b: std::array::from_fn(|i| if i < self.n { b(i) } else { 0.0 }), ..*self }
+    }
+
+    /// The x that is 0 where not `free` and minimises over the others; with `sum`, among the x of that sum.
+    pub fn solve_on_plane(&self, free: impl Fn(usize) -> bool, sum: Option<f64>) -> Option<Row> {
+        let mut places = [0; MAX_LOBES];
+        let mut n = 0;
+        for i in (0..self.n).filter(|&i| free(i)) {
+            places[n] = i;
+            n += 1;
+        }
+        let part = Self::new(n, |i, j| self.gram[places[i]][places[j]], |i| self.b[places[i]]);
+        let mut x = part.solve();
+        if let Some(sum) = sum {
+            let along = part.with(|_| 1.0).solve();
+            let weight: f64 = along.iter().sum();
+            if weight.is_nan() || weight <= 0.0 {
+                return None;
+            }
+            let excess = (x.iter().sum::<f64>() - sum) / weight;
+            x.iter_mut().zip(&along).for_each(|(x, a)| *x -= a * excess);
+        }
+        let mut all = Row::default();
+        (0..n).for_each(|i| all[places[i]] = x[i]);
+        Some(all)
+    }
+
+    /// Minimum-norm solution of G x = b after scaling columns to unit norm.
+    pub fn solve(&self) -> Row {
+        let scale: Row = std::array::from_fn(|i| {
+            let d = self.gram[i][i];
+            if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
+        });
+        let scaled = Self::new(self.n, |i, j| self.gram[i][j] * scale[i] * scale[j], |i| self.b[i] * scale[i]);
+        let x = scaled.cholesky().unwrap_or_else(|| scaled.by_eigenvalues());
+        std::array::from_fn(|i| x[i] * scale[i])
+    }
+
+    /// The quick way, where no pivot says that the matrix is nearly singular.
+    fn cholesky(&self) -> Option<Row> {
+        let (n, mut l, mut x) = (self.n, self.gram, self.b);
+        for j in 0..n {
+            let pivot = l[j][j] - (0..j).map(|k| l[j][k] * l[j][k]).sum::<f64>();
+            if pivot.is_nan() || pivot <= LEAST_PIVOT {
+                return None;
+            }
+            l[j][j] = pivot.sqrt();
+            for i in j + 1..n {
+                l[i][j] = (l[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>()) / l[j][j];
+            }
+            x[j] = (x[j] - (0..j).map(|k| l[j][k] * x[k]).sum::<f64>()) / l[j][j];
+        }
+        for j in (0..n).rev() {
+            x[j] = (x[j] - (j + 1..n).map(|k| l[k][j] * x[k]).sum::<f64>()) / l[j][j];
+        }
+        Some(x)
+    }
+
+    /// The sure way; the rows beyond the last unknown are 0 and count as undetermined.
+    fn by_eigenvalues(&self) -> Row {
+        let eigen = Matrix4::from_fn(|i, j| self.gram[i][j]).symmetric_eigen();
+        let largest = eigen.eigenvalues.max();
+        let inverse = eigen.eigenvalues.map(|l| if l > RANK * largest { 1.0 / l } else { 0.0 });
+        let projected = (eigen.eigenvectors.transpose() * Vector4::from(self.b)).component_mul(&inverse);
+        (eigen.eigenvectors * projected).into()
+    }
+}
+
+/// a·b.
+fn dot(a: &Row, b: &Row) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl Feasible<'_> {
-    fn holds(&self, x: &DVector<f64>) -> bool {
+    fn holds(&self, x: &Row) -> bool {
         x.iter().zip(self.ranges).all(|(x, (low, high))| x >= low && x <= high)
-            && self.cap.is_none_or(|cap| x.sum() <= cap * (1.0 + 4.0 * f64::EPSILON))
+            && self.cap.is_none_or(|cap| x.iter().sum::<f64>() <= cap * (1.0 + 4.0 * f64::EPSILON))
     }
 
     fn pinned(&self) -> bool {
         self.ranges.iter().any(|(low, high)| low == high)
     }
 
-    fn lows(&self) -> DVector<f64> {
-        DVector::from_iterator(self.ranges.len(), self.ranges.iter().map(|r| r.0))
-    }
-
-    /// All ways in which the unknowns can stand.
-    fn stands(&self) -> Vec<Vec<Stand>> {
-        let mut all = vec![Vec::new()];
-        for (low, high) in self.ranges {
-            let mut choices = vec![Stand::Low];
-            if low < high {
-                choices.push(Stand::Free);
-                if high.is_finite() {
-                    choices.push(Stand::High);
-                }
+    /// Goes on to the next way in which the unknowns can stand; false after the last.
+    fn next(&self, stands: &mut [Stand; MAX_LOBES]) -> bool {
+        for (stand, (low, high)) in stands.iter_mut().zip(self.ranges).rev() {
+            *stand = match *stand {
+                Stand::Low if low < high => Stand::Free,
+                Stand::Free if high.is_finite() => Stand::High,
+                _ => Stand::Low,
+            };
+            if *stand != Stand::Low {
+                return true;
             }
-            all = all
-                .into_iter()
-                .flat_map(|set: Vec<Stand>| choices.iter().map(move |c| set.iter().copied().chain([*c]).collect()))
-                .collect();
         }
-        all
+        false
     }
 
     /// Whether an unknown may move either way from `x`, and whether the cap is reached: what a small change of the data can move.
@@ -93,57 +209,6 @@ impl Feasible<'_> {
     }
 }
 
-/// The stationary point with the unknowns where `stands` says, on the cap where `capped`.
-fn stationary(
-    gram: &DMatrix<f64>,
-    b: &DVector<f64>,
-    feasible: &Feasible<'_>,
-    stands: &[Stand],
-    capped: bool,
-) -> Option<DVector<f64>> {
-    let mut x = DVector::from_fn(b.len(), |i, _| match stands[i] {
-        Stand::Low => feasible.ranges[i].0,
-        Stand::High => feasible.ranges[i].1,
-        Stand::Free => 0.0,
-    });
-    let free: Vec<usize> = (0..b.len()).filter(|&i| stands[i] == Stand::Free).collect();
-    if capped && (feasible.cap.is_none() || free.is_empty()) {
-        return None;
-    }
-    let rest = (b - gram * &x).select_rows(&free);
-    let matrix = gram.select_rows(&free).select_columns(&free);
-    let sum = capped.then(|| feasible.cap.unwrap_or(0.0) - x.sum());
-    let solved = solve_on_plane(&matrix, &rest, sum)?;
-    free.iter().zip(solved.iter()).for_each(|(&i, v)| x[i] = *v);
-    Some(x)
-}
-
-/// Solution of G x = b; with `sum`, the minimiser among the x of that sum.
-pub(super) fn solve_on_plane(gram: &DMatrix<f64>, b: &DVector<f64>, sum: Option<f64>) -> Option<DVector<f64>> {
-    let plain = solve_free(gram, b);
-    let Some(sum) = sum else { return Some(plain) };
-    let along = solve_free(gram, &DVector::repeat(b.len(), 1.0));
-    let weight = along.sum();
-    (weight > 0.0).then(|| &plain - along * ((plain.sum() - sum) / weight))
-}
-
-/// Minimum-norm solution of G x = b after scaling columns to unit norm.
-pub(super) fn solve_free(gram: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
-    if b.is_empty() {
-        return DVector::zeros(0);
-    }
-    let (scaled, scale) = unit_columns(gram);
-    let rhs = b.component_mul(&scale);
-    if let Some(x) = cholesky(&scaled, &rhs) {
-        return x.component_mul(&scale);
-    }
-    let eigen = scaled.symmetric_eigen();
-    let largest = eigen.eigenvalues.max();
-    let inverse = eigen.eigenvalues.map(|l| if l > RANK * largest { 1.0 / l } else { 0.0 });
-    let projected = (eigen.eigenvectors.transpose() * rhs).component_mul(&inverse);
-    (eigen.eigenvectors * projected).component_mul(&scale)
-}
-
 /// A Gram matrix with its columns scaled to unit norm, and the scales; a column of zeros stays.
 pub(super) fn unit_columns(gram: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let scale = gram.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
@@ -151,17 +216,19 @@ pub(super) fn unit_columns(gram: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) 
     (scaled, scale)
 }
 
-/// The quick way, where no pivot of the scaled matrix says that it is nearly singular.
-fn cholesky(scaled: &DMatrix<f64>, rhs: &DVector<f64>) -> Option<DVector<f64>> {
-    let factor = scaled.clone().cholesky()?;
-    let least = factor.l_dirty().diagonal().min();
-    (least > 1e-4).then(|| factor.solve(rhs))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::{dmatrix, dvector};
+
+    fn minimise(gram: &DMatrix<f64>, b: &DVector<f64>, feasible: &Feasible<'_>) -> DVector<f64> {
+        let quadratic = Quadratic::new(b.len(), |i, j| gram[(i, j)], |i| b[i]);
+        DVector::from_column_slice(&quadratic.minimise(feasible)[..b.len()])
+    }
+
+    fn holds(feasible: &Feasible<'_>, x: &DVector<f64>) -> bool {
+        feasible.holds(&std::array::from_fn(|i| x.get(i).copied().unwrap_or(0.0)))
+    }
 
     const ANY: [(f64, f64); 2] = [(0.0, f64::INFINITY); 2];
 
@@ -208,14 +275,14 @@ mod tests {
         ] {
             let feasible = Feasible { ranges: &ranges, cap };
             let x = minimise(&g, &b, &feasible);
-            assert!(feasible.holds(&x), "{x}");
+            assert!(holds(&feasible, &x), "{x}");
             let steps = 24;
             for k in 0..(steps + 1i32).pow(3) {
                 let at =
                     |k: i32, (low, high): (f64, f64)| low + (high.min(2.0) - low) * f64::from(k) / f64::from(steps);
                 let (i, j, l) = (k % 25, k / 25 % 25, k / 625);
                 let other = dvector![at(i, ranges[0]), at(j, ranges[1]), at(l, ranges[2])];
-                assert!(!feasible.holds(&other) || value(&other) >= value(&x) - 1e-12, "{other} below {x}");
+                assert!(!holds(&feasible, &other) || value(&other) >= value(&x) - 1e-12, "{other} below {x}");
             }
         }
     }

@@ -6,6 +6,7 @@
 //! the weights.
 
 use std::cell::RefCell;
+use std::rc::Rc;
 
 use argmin::core::Error;
 use nalgebra::{DMatrix, DVector};
@@ -13,11 +14,11 @@ use nalgebra::{DMatrix, DVector};
 use super::limits::Ranges;
 use super::options::FitError;
 use super::passes::{self, Moments, Saturation, ShapedLobe, Sums, Want};
-use super::quadratic::{self, Feasible, solve_free, solve_on_plane};
+use super::quadratic::{Feasible, Quadratic, Row};
 use super::samples::Samples;
 use super::solver::{Linearization, Linearize};
 use super::transform::Transform;
-use crate::brdf::{LobeKind, ModelSpec, Parameter};
+use crate::brdf::{LobeKind, MAX_LOBES, ModelSpec, Parameter};
 
 /// A model on samples. Weights and values are in the samples' scale.
 #[derive(Debug)]
@@ -138,40 +139,53 @@ impl<'a> Problem<'a> {
     }
 
     /// Half the gradient by t and the Gauss–Newton matrix of the reduced cost (Kaufman 1975): the slope columns' Gram matrix, less
-    /// what the free weights can follow. `normal` is by [weights, bare slopes] of each channel, `pull` Σ w r slope.
-    fn reduce(
+    /// what the free weights can follow. `normal` is by [weights, bare slopes] of each channel, `pull` Σ w r slope of a channel.
+    fn reduce<'m>(
         &self,
         weights: &[DVector<f64>],
-        normal: impl Fn(usize) -> DMatrix<f64>,
-        pull: impl Fn(usize) -> DVector<f64>,
+        normal: impl Fn(usize) -> &'m DMatrix<f64>,
+        pull: impl Fn(usize, usize) -> f64,
     ) -> (DMatrix<f64>, DVector<f64>) {
         let (k, p) = (self.kinds.len(), self.layout.len());
         let mut reduced = DMatrix::zeros(p, p);
         let mut gradient = DVector::zeros(p);
         for (c, x) in weights.iter().enumerate() {
-            let matrix = normal(c);
-            let strength = DMatrix::from_diagonal(&DVector::from_fn(p, |i, _| x[self.layout[i].0]));
-            let cross = matrix.view((0, k), (k, p)) * &strength;
-            let follow = self.follow(c, x, &matrix, &cross);
-            let slopes = &strength * matrix.view((k, k), (p, p)) * &strength;
-            reduced += slopes - cross.transpose() * follow;
-            gradient += &strength * pull(c);
+            let (matrix, following) = (normal(c), self.following(c, x, normal(c)));
+            let strength = |i: usize| x[self.layout[i].0];
+            for j in 0..p {
+                let moved = following.undo(|l| matrix[(l, k + j)] * strength(j));
+                for i in 0..p {
+                    let followed: f64 = (0..k).map(|l| matrix[(l, k + i)] * moved[l]).sum();
+                    reduced[(i, j)] += strength(i) * (matrix[(k + i, k + j)] * strength(j) - followed);
+                }
+                gradient[j] += strength(j) * pull(c, j);
+            }
         }
         (0.5 * (&reduced + reduced.transpose()), gradient)
     }
 
-    /// How the free weights of a channel follow columns: minus the change of the weights that best cancels each of `cross`.
-    fn follow(&self, channel: usize, x: &DVector<f64>, matrix: &DMatrix<f64>, cross: &DMatrix<f64>) -> DMatrix<f64> {
-        let (free, capped) = self.feasible(channel).free_at(x);
-        let gram = matrix.select_rows(&free).select_columns(&free);
-        let mut follow = DMatrix::zeros(x.len(), cross.ncols());
-        for j in 0..cross.ncols() {
-            let rhs = cross.column(j).select_rows(&free);
-            if let Some(moved) = solve_on_plane(&gram, &rhs, capped.then_some(0.0)) {
-                free.iter().zip(moved.iter()).for_each(|(&i, v)| follow[(i, j)] = *v);
-            }
-        }
-        follow
+    /// What the weights of a channel can follow. `matrix` is by [weights, …].
+    fn following(&self, channel: usize, x: &DVector<f64>, matrix: &DMatrix<f64>) -> Following {
+        let (places, capped) = self.feasible(channel).free_at(x);
+        let mut free = [false; MAX_LOBES];
+        places.into_iter().for_each(|l| free[l] = true);
+        Following { quadratic: Quadratic::new(x.len(), |i, j| matrix[(i, j)], |_| 0.0), free, capped }
+    }
+}
+
+/// The weights of a channel that a small change can move.
+struct Following {
+    quadratic: Quadratic,
+    free: [bool; MAX_LOBES],
+    /// Whether they stay on the cap.
+    capped: bool,
+}
+
+impl Following {
+    /// Minus the change of the weights that best cancels a column, of which the products with the weights' columns are given.
+    fn undo(&self, products: impl Fn(usize) -> f64) -> Row {
+        let solved = self.quadratic.with(products).solve_on_plane(|l| self.free[l], self.capped.then_some(0.0));
+        solved.unwrap_or_default()
     }
 }
 
@@ -182,19 +196,21 @@ pub(super) struct Search<'a> {
     pub transform: &'a Transform,
     /// Σ w g² y² of each channel.
     pub energy: &'a [f64],
-    /// The transforms' sums over all samples.
-    totals: Vec<f64>,
 }
 
 impl<'a> Search<'a> {
     pub fn new(problem: &'a Problem<'a>, transform: &'a Transform, energy: &'a [f64]) -> Self {
-        let measures = problem.samples.lists() + problem.samples.channels.len();
-        Self { problem, transform, energy, totals: (0..measures).map(|m| transform.total(m)).collect() }
+        Self { problem, transform, energy }
     }
 
     /// The same samples under other bounds.
     pub fn of<'b>(&'b self, problem: &'b Problem<'b>) -> Search<'b> {
-        Search { problem, transform: self.transform, energy: self.energy, totals: self.totals.clone() }
+        Search { problem, transform: self.transform, energy: self.energy }
+    }
+
+    /// As the solver takes it.
+    pub fn walk(&self) -> Walk<'_> {
+        Walk { search: self, last: RefCell::new(None) }
     }
 
     /// Gram matrices and data vectors at `lobes`, with the slopes by t on request.
@@ -208,7 +224,7 @@ impl<'a> Search<'a> {
         // A lobe alone: its products with constants, and with the data.
         for (a, lobe) in columns.lobes.iter().enumerate() {
             let jets = match lobe.exponent {
-                None => self.totals.iter().map(|t| [*t, 0.0, 0.0]).collect(),
+                None => self.transform.totals.iter().map(|t| [*t, 0.0, 0.0]).collect(),
                 Some(n) => self.transform.at(n, 0..lists + channels),
             };
             let constants = columns.lobes.iter().enumerate().filter(|(_, other)| other.exponent.is_none());
@@ -232,22 +248,22 @@ impl<'a> Search<'a> {
         Moments { gram, data }
     }
 
+    /// The cost of a channel by its weights, Σ w g² y² aside.
+    fn quadratic(&self, moments: &Moments, channel: usize) -> Quadratic {
+        let (gram, data) = (moments.gram(channel), &moments.data[channel]);
+        Quadratic::new(self.problem.kinds.len(), |i, j| gram[(i, j)], |i| data[i])
+    }
+
+    /// The weights that minimise the cost.
     pub fn weights(&self, moments: &Moments) -> Vec<DVector<f64>> {
         let k = self.problem.kinds.len();
-        let solve = |c: usize| {
-            let gram = moments.gram(c).view((0, 0), (k, k)).into_owned();
-            quadratic::minimise(&gram, &moments.data[c].rows(0, k).into_owned(), &self.problem.feasible(c))
-        };
-        (0..moments.data.len()).map(solve).collect()
+        let solve = |c: usize| self.quadratic(moments, c).minimise(&self.problem.feasible(c));
+        (0..moments.data.len()).map(|c| DVector::from_column_slice(&solve(c)[..k])).collect()
     }
 
     /// Σ w r² = y·y − 2 b·x + x·Gx; a difference, so good to about 1e-15 of y·y.
     pub fn cost_of(&self, moments: &Moments, weights: &[DVector<f64>]) -> f64 {
-        let k = self.problem.kinds.len();
-        let of = |(c, x): (usize, &DVector<f64>)| {
-            let gram = moments.gram(c).view((0, 0), (k, k)).into_owned();
-            self.energy[c] - 2.0 * x.dot(&moments.data[c].rows(0, k)) + x.dot(&(gram * x))
-        };
+        let of = |(c, x): (usize, &DVector<f64>)| self.energy[c] + self.quadratic(moments, c).value(&row(x));
         weights.iter().enumerate().map(of).sum::<f64>()
     }
 
@@ -260,19 +276,55 @@ impl<'a> Search<'a> {
     }
 }
 
-impl Linearize for Search<'_> {
+/// Weights in a row.
+fn row(x: &DVector<f64>) -> Row {
+    std::array::from_fn(|l| x.get(l).copied().unwrap_or(0.0))
+}
+
+/// A way through the search's points. An accepted trial is linearised where its cost was taken, so the last point is kept.
+#[derive(Debug)]
+pub(super) struct Walk<'a> {
+    search: &'a Search<'a>,
+    last: RefCell<Option<Rc<Visited>>>,
+}
+
+#[derive(Debug)]
+struct Visited {
+    t: DVector<f64>,
+    moments: Moments,
+    weights: Vec<DVector<f64>>,
+    cost: f64,
+}
+
+impl Walk<'_> {
+    fn visit(&self, t: &DVector<f64>) -> Rc<Visited> {
+        if let Some(last) = self.last.borrow().as_ref().filter(|last| last.t == *t) {
+            return Rc::clone(last);
+        }
+        let moments = self.search.moments(&self.search.problem.shaped(t.as_slice()), true);
+        let weights = self.search.weights(&moments);
+        let cost = self.search.cost_of(&moments, &weights).max(0.0);
+        let here = Rc::new(Visited { t: t.clone(), moments, weights, cost });
+        *self.last.borrow_mut() = Some(Rc::clone(&here));
+        here
+    }
+}
+
+impl Linearize for Walk<'_> {
     fn cost(&self, t: &DVector<f64>) -> Result<f64, Error> {
-        Ok(self.solve(t.as_slice()).cost.max(0.0))
+        Ok(self.visit(t).cost)
     }
 
     fn linearize(&self, t: &DVector<f64>) -> Result<Linearization, Error> {
-        let (k, p) = (self.problem.kinds.len(), self.problem.layout.len());
-        let moments = self.moments(&self.problem.shaped(t.as_slice()), true);
-        let weights = self.weights(&moments);
-        let cost = self.cost_of(&moments, &weights).max(0.0);
-        let pull = |c: usize| moments.gram(c).view((k, 0), (p, k)) * &weights[c] - moments.data[c].rows(k, p);
-        let (normal, gradient) = self.problem.reduce(&weights, |c| moments.gram(c).clone(), pull);
-        Ok(Linearization::from_normal(cost, normal, &gradient))
+        let k = self.search.problem.kinds.len();
+        let here = self.visit(t);
+        let (moments, weights) = (&here.moments, &here.weights);
+        let pull = |c: usize, i: usize| {
+            let products = weights[c].iter().enumerate().map(|(l, x)| moments.gram(c)[(k + i, l)] * x);
+            products.sum::<f64>() - moments.data[c][k + i]
+        };
+        let (normal, gradient) = self.search.problem.reduce(weights, |c| moments.gram(c), pull);
+        Ok(Linearization::from_normal(here.cost, normal, &gradient))
     }
 }
 
@@ -423,7 +475,9 @@ impl<'a> Streamed<'a> {
             gram[(i, i)] *= 1.0 + damping;
         }
         let gradient = at.gradient.rows(0, k);
-        let next = quadratic::minimise(&gram, &(&gram * x - gradient), &self.problem.feasible(channel));
+        let b = &gram * x - gradient;
+        let quadratic = Quadratic::new(k, |i, j| gram[(i, j)], |i| b[i]);
+        let next = DVector::from_column_slice(&quadratic.minimise(&self.problem.feasible(channel))[..k]);
         let step = &next - x;
         let gain = -(2.0 * step.dot(&gradient) + step.dot(&(&gram * &step)));
         (next, gain.max(0.0))
@@ -436,12 +490,12 @@ impl Linearize for Streamed<'_> {
     }
 
     fn linearize(&self, t: &DVector<f64>) -> Result<Linearization, Error> {
-        let (k, p) = (self.problem.kinds.len(), self.problem.layout.len());
+        let k = self.problem.kinds.len();
         let solution = self.solve(t.as_slice());
         let problem = self.problem;
         let all = passes::sums(problem.samples, &solution.lobes, &solution.weights, problem.saturation, Want::All);
-        let pull = |c: usize| all[c].gradient.rows(k, p).into_owned();
-        let (normal, gradient) = problem.reduce(&solution.weights, |c| all[c].normal.clone(), pull);
+        let pull = |c: usize, i: usize| all[c].gradient[k + i];
+        let (normal, gradient) = problem.reduce(&solution.weights, |c| &all[c].normal, pull);
         Ok(Linearization::from_normal(solution.cost, normal, &gradient))
     }
 }
@@ -501,14 +555,14 @@ fn drop_rounding(search: &Search<'_>, moments: &Moments, at: &mut Solution) {
 /// The step in all parameters from the sums of true residuals, its part in the shapes damped by a share of their matrix's diagonal.
 fn joint_step(problem: &Problem<'_>, moments: &Moments, at: &Solution, sums: &[Sums], damping: f64) -> Solution {
     let (k, p) = (problem.kinds.len(), problem.layout.len());
-    let pull = |c: usize| sums[c].gradient.rows(k, p).into_owned();
-    let (mut normal, mut by_t) = problem.reduce(&at.weights, |c| moments.gram(c).clone(), pull);
+    let pull = |c: usize, i: usize| sums[c].gradient[k + i];
+    let (mut normal, mut by_t) = problem.reduce(&at.weights, |c| moments.gram(c), pull);
     let strength = |x: &DVector<f64>| DVector::from_fn(p, |i, _| x[problem.layout[i].0]);
     // What the weights do by themselves, and what is then left of the gradient by t.
     let mut own = Vec::new();
     for (c, x) in at.weights.iter().enumerate() {
-        let rhs = DMatrix::from_column_slice(k, 1, sums[c].gradient.rows(0, k).into_owned().as_slice());
-        let moved = problem.follow(c, x, moments.gram(c), &rhs).column(0).into_owned();
+        let moved = problem.following(c, x, moments.gram(c)).undo(|l| sums[c].gradient[l]);
+        let moved = DVector::from_column_slice(&moved[..k]);
         by_t -= (moments.gram(c).view((k, 0), (p, k)) * &moved).component_mul(&strength(x));
         own.push(moved);
     }
@@ -519,17 +573,15 @@ fn joint_step(problem: &Problem<'_>, moments: &Moments, at: &Solution, sums: &[S
         let (low, high) = problem.bounds[i];
         low == high || (at.t[i] <= low && by_t[i] > 0.0) || (at.t[i] >= high && by_t[i] < 0.0)
     };
-    let free: Vec<usize> = (0..p).filter(|&i| !held(i)).collect();
-    let solved = solve_free(&normal.select_rows(&free).select_columns(&free), &by_t.select_rows(&free));
-    let mut t = at.t.clone();
-    free.iter()
-        .zip(solved.iter())
-        .for_each(|(&i, v)| t[i] = (t[i] - v).clamp(problem.bounds[i].0, problem.bounds[i].1));
+    let quadratic = Quadratic::new(p, |i, j| normal[(i, j)], |i| by_t[i]);
+    let solved = quadratic.solve_on_plane(|i| !held(i), None).unwrap_or_default();
+    let moved = |i: usize| (at.t[i] - solved[i]).clamp(problem.bounds[i].0, problem.bounds[i].1);
+    let t: Vec<f64> = (0..p).map(|i| if held(i) { at.t[i] } else { moved(i) }).collect();
     let step = DVector::from_fn(p, |i, _| t[i] - at.t[i]);
     let follow = |(c, x): (usize, &DVector<f64>)| {
         let cross = moments.gram(c).view((0, k), (k, p)) * step.component_mul(&strength(x));
-        let also = problem.follow(c, x, moments.gram(c), &DMatrix::from_column_slice(k, 1, cross.as_slice()));
-        let next = x - &own[c] - also.column(0);
+        let also = problem.following(c, x, moments.gram(c)).undo(|l| cross[l]);
+        let next = x - &own[c] - DVector::from_column_slice(&also[..k]);
         DVector::from_fn(k, |l, _| next[l].clamp(problem.ranges[c][l].0, problem.ranges[c][l].1))
     };
     let weights = at.weights.iter().enumerate().map(follow).collect();

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 
 use super::options::FitError;
 use super::passes::ShapedLobe;
-use super::quadratic::{self, Feasible};
+use super::quadratic::{Feasible, Quadratic};
 use super::reduced::{Problem, Search, Streamed};
 use super::solver::{self, LevenbergMarquardt, Linearize, Outcome, SolverOptions};
+use crate::brdf::MAX_LOBES;
 use crate::numeric::random::{Purpose, RngExt, stream};
 
 /// Combinations of nodes kept while lobes are added one by one.
@@ -126,18 +127,33 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
     if problem.layout.len() > 1 {
         starts.extend(drawn(problem, random));
     }
-    let run = |start: &Vec<f64>| polish_start(search, problem, start.clone(), steps);
+    let run = |start: &Vec<f64>| polish_start(search.walk(), problem, start.clone(), steps);
     let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
     let mut best = best_of(outcomes, lattice)?;
     if random > 0 && !problem.layout.is_empty() {
+        order_alike(problem, &mut best.outcome);
         // The shapes' last digits, where the cost itself no longer tells points apart.
         let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
-        let last = solver::minimize(search, lm, best.outcome.t.clone(), steps);
+        let last = solver::minimize(search.walk(), lm, best.outcome.t.clone(), steps);
         let last = last.map_err(|e| FitError::Solver { reason: e.to_string() })?;
         best.outcome.history.extend(last.history.into_iter().skip(1));
         (best.outcome.t, best.outcome.cost, best.outcome.stop) = (last.t, last.cost, last.stop);
     }
     Ok(best)
+}
+
+/// Lobes that could change places get rising shapes, so that one minimum looks the same whichever start found it.
+fn order_alike(problem: &Problem<'_>, outcome: &mut Outcome) {
+    let bounds = problem.bounds.windows(2).all(|b| b[0] == b[1]);
+    let of = |ranges: &Vec<(f64, f64)>| problem.layout.windows(2).all(|l| ranges[l[0].0] == ranges[l[1].0]);
+    if !bounds || !problem.ranges.iter().all(of) {
+        return;
+    }
+    let mut order: Vec<usize> = (0..outcome.t.len()).collect();
+    order.sort_by(|&a, &b| outcome.t[a].total_cmp(&outcome.t[b]));
+    let pick = |list: &[f64]| -> Vec<f64> { order.iter().map(|&i| list[i]).collect() };
+    outcome.t = DVector::from_vec(pick(outcome.t.as_slice()));
+    outcome.history.iter_mut().for_each(|step| step.parameters = pick(&step.parameters));
 }
 
 /// Starts polished of a problem that takes passes.
@@ -219,7 +235,7 @@ fn best_of(outcomes: Vec<Outcome>, lattice: usize) -> Result<Found, FitError> {
 fn bracketed(search: &Search<'_>) -> Vec<Vec<f64>> {
     let nodes = Nodes::new(search.problem).t;
     let evaluate = |t: &f64| -> (f64, f64, f64) {
-        let at = search.linearize(&DVector::from_element(1, *t));
+        let at = search.walk().linearize(&DVector::from_element(1, *t));
         let slope = |l: solver::Linearization| (l.cost, 2.0 * (l.factor.transpose() * l.rhs)[0]);
         let (cost, slope) = at.map_or((f64::NAN, f64::NAN), slope);
         (*t, cost, slope)
@@ -280,16 +296,17 @@ impl Lattice {
 
     /// Reduced cost with the first shaped lobes at these nodes, the others absent.
     fn cost(&self, problem: &Problem<'_>, nodes: &[usize]) -> f64 {
-        let columns: Vec<usize> = (0..self.base.len()).chain(nodes.iter().map(|&k| self.base.len() + k)).collect();
-        let lobes = self.base.iter().chain(&self.shaped[..nodes.len()]);
+        let base = self.base.len();
+        let n = base + nodes.len();
+        let column = |i: usize| if i < base { i } else { base + nodes[i - base] };
+        let lobe = |i: usize| if i < base { self.base[i] } else { self.shaped[i - base] };
+        let mut ranges = [(0.0, 0.0); MAX_LOBES];
         let mut cost = self.energy;
         for (c, data) in self.data.iter().enumerate() {
-            let ranges: Vec<(f64, f64)> = lobes.clone().map(|&l| problem.ranges[c][l]).collect();
+            (0..n).for_each(|i| ranges[i] = problem.ranges[c][lobe(i)]);
             let gram = &self.gram[if self.gram.len() == 1 { 0 } else { c }];
-            let gram = gram.select_rows(&columns).select_columns(&columns);
-            let b = data.select_rows(&columns);
-            let x = quadratic::minimise(&gram, &b, &Feasible { ranges: &ranges, cap: problem.cap });
-            cost += x.dot(&(gram * &x)) - 2.0 * x.dot(&b);
+            let quadratic = Quadratic::new(n, |i, j| gram[(column(i), column(j))], |i| data[column(i)]);
+            cost += quadratic.value(&quadratic.minimise(&Feasible { ranges: &ranges[..n], cap: problem.cap }));
         }
         cost
     }

@@ -15,6 +15,7 @@ use block::{Values, neighbours};
 use select::{Judge, Left, least_cos};
 pub(in crate::fit) use select::{Thin, offset};
 
+use super::bins::Bins;
 use super::folded::{Gathered, Seen};
 use super::loss::{Loss, RELATIVE_EPSILON};
 use super::merl_lines::{self, Line, MerlLines};
@@ -141,9 +142,9 @@ impl<'a> Samples<'a> {
             sums
         };
         let parts: Vec<Gathered<M>> = (0..PIECES).into_par_iter().map(piece).collect();
-        let (mut total, mut seen) = (Transform::new(1 + M), Seen::<M>::default());
+        let (mut total, mut seen) = (Bins::new(1 + M), Seen::<M>::default());
         for part in &parts {
-            total.merge(&part.transform);
+            total.merge(&part.bins);
             seen.add(&part.seen());
         }
         let plain = seen.unlike == 0.0 && seen.count > 0.0;
@@ -159,7 +160,7 @@ impl<'a> Samples<'a> {
         let mut factors = vec![factor * unit; 1 + M];
         factors[0] = factor;
         total.scale(&factors);
-        Some((total, seen.energy.map(|e| e * factor * unit * unit).to_vec()))
+        Some((Transform::of_bins(&total), seen.energy.map(|e| e * factor * unit * unit).to_vec()))
     }
 
     /// A MERL table needs no lists where every sample counts and its weight is plain.
@@ -201,6 +202,14 @@ impl<'a> Samples<'a> {
         match &self.source {
             Source::Listed(all) => all.len().div_ceil(BLOCK),
             Source::Merl(_) => MerlLines::blocks(),
+        }
+    }
+
+    /// All samples in one block, where they are listed and fit into one.
+    pub fn single_block(&self) -> Option<&Block> {
+        match &self.source {
+            Source::Listed(all) if all.len() <= BLOCK => Some(all),
+            _ => None,
         }
     }
 
