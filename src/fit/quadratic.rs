@@ -10,6 +10,9 @@ const RANK: f64 = 1e-14;
 /// A matrix of columns of length 1 with a pivot below this is nearly singular.
 const LEAST_PIVOT: f64 = 1e-8;
 
+/// A column whose Gram entry is below this counts as 0: data of about 1, as samples are scaled, would take a weight of 10¹³.
+const INVISIBLE: f64 = 1e-26;
+
 /// A number for each unknown, 0 beyond the last.
 pub(super) type Row = [f64; MAX_LOBES];
 
@@ -39,10 +42,12 @@ pub(super) struct Quadratic {
 }
 
 impl Quadratic {
-    /// In `n` unknowns.
+    /// In `n` unknowns; those of columns that are 0, or as good as that, don't count.
     pub fn new(n: usize, gram: impl Fn(usize, usize) -> f64, b: impl Fn(usize) -> f64) -> Self {
-        let row = |of: &dyn Fn(usize) -> f64| -> Row { std::array::from_fn(|j| if j < n { of(j) } else { 0.0 }) };
-        let gram = std::array::from_fn(|i| if i < n { row(&|j| gram(i, j)) } else { Row::default() });
+        // NaN is visible, so that it is not hidden.
+        let visible: [bool; MAX_LOBES] = std::array::from_fn(|i| i < n && !(gram(i, i) < INVISIBLE));
+        let row = |of: &dyn Fn(usize) -> f64| -> Row { std::array::from_fn(|j| if visible[j] { of(j) } else { 0.0 }) };
+        let gram = std::array::from_fn(|i| if visible[i] { row(&|j| gram(i, j)) } else { Row::default() });
         Self { n, gram, b: row(&b) }
     }
 
@@ -252,7 +257,9 @@ mod tests {
     fn an_undetermined_direction_gets_the_minimum_norm() {
         let x = solve(&dmatrix![1.0, 1.0; 1.0, 1.0], &dvector![2.0, 2.0]);
         assert!((x - dvector![1.0, 1.0]).norm() < 1e-14);
-        // A column of zeros has weight 0.
+        // A column of zeros has weight 0, and so has one that is next to nothing.
+        let x = solve(&dmatrix![4.0, 1e-150; 1e-150, 1e-300], &dvector![8.0, 1e-151]);
+        assert_eq!(x[1], 0.0);
         let x = solve(&dmatrix![4.0, 0.0; 0.0, 0.0], &dvector![8.0, 0.0]);
         assert!((x - dvector![2.0, 0.0]).norm() < 1e-14);
     }
