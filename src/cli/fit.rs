@@ -65,13 +65,13 @@ pub(super) struct Args {
     /// Fit under the constraint that no channel reflects more light than it receives
     #[arg(long, help_heading = MODEL)]
     conserve_energy: bool,
-    /// Time that the fit may take, 50ms or 2s say: it uses as many samples as that allows
+    /// Time that the fit may take, bootstrap included, 50ms or 2s say: it uses as many samples as that allows
     #[arg(long, value_name = "TIME", value_parser = parse_time, help_heading = EFFORT)]
     time_budget: Option<Duration>,
     /// Stop at a part of the samples once the rmse over all is within this share of the best (1%, say) with 95 % confidence
     #[arg(long, value_name = "SHARE", value_parser = parse_share, allow_hyphen_values = true, help_heading = EFFORT)]
     target_rmse_excess: Option<f64>,
-    /// Also find standard errors by redrawing the data N times
+    /// Also find standard errors by redrawing the data N times; where a budget or target ends the fit early, the samples it ended with
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000), help_heading = EFFORT)]
     bootstrap: Option<u32>,
     /// Seed of the redrawing

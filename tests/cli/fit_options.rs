@@ -248,6 +248,37 @@ fn a_budget_ends_the_work_and_says_what_that_costs() {
 }
 
 #[test]
+fn a_bootstrap_is_drawn_from_the_samples_that_a_budget_or_target_ended_with() {
+    let b = Bench::new();
+    large(&b);
+    for (option, value) in [("--target-rmse-excess", "2%"), ("--time-budget", "1us")] {
+        let fit = b.json(&["fit", "large.csv", option, value, "--bootstrap", "30"]);
+        assert!(fit["fit"]["subset"].is_object(), "{option}: a part of the samples");
+        let error = |of: &Value, lobe: usize| {
+            let record = &of["standard_error"][lobe];
+            [number(&record["weight"][0]), record["shape"]["exponent"].as_f64().unwrap_or(f64::NAN)]
+        };
+        let (drawn, known) = (error(&fit["fit"]["bootstrap"], 1), error(&fit["fit"], 1));
+        // A standard deviation of 30 drawings scatters by 1/√58 = 13 %.
+        for (drawn, known) in drawn.iter().zip(known) {
+            assert!((0.4..2.5).contains(&(drawn / known)), "{option}: {drawn} vs {known}");
+        }
+    }
+}
+
+#[test]
+fn channels_apart_are_all_fitted_within_a_budget() {
+    let b = Bench::new();
+    large(&b);
+    let fit = b.json(&["fit", "large.csv", "--per-channel", "--time-budget", "1us", "--bootstrap", "2"]);
+    assert_eq!(fit["fit"]["status"], "budget");
+    let exponents = fit["lobes"][1]["shape"]["exponent"].as_array().expect("one a channel");
+    assert!(exponents.iter().all(|n| (number(n) / 90.0 - 1.0).abs() < 0.05), "{exponents:?}");
+    let drawn = fit["fit"]["bootstrap"]["standard_error"][1]["shape"]["exponent"].as_array().expect("one a channel");
+    assert!(drawn.len() == 3 && drawn.iter().all(Value::is_number), "{drawn:?}");
+}
+
+#[test]
 fn a_bootstrap_agrees_with_the_analytic_errors_and_depends_on_its_seed_alone() {
     let b = Bench::new();
     b.paint("p.csv");
