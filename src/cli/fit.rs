@@ -11,7 +11,7 @@ use super::info::Reading;
 use super::output::{check_folder, write_text};
 use super::ui::{self, Ui};
 use crate::brdf::{FitRecord, Material, ModelChoice, ModelSpec, PerChannel, SpecError};
-use crate::fit::{Bootstrap, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
+use crate::fit::{Bootstrap, FitError, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
 use crate::measurement::{Measurement, formats};
 
 const MODEL: &str = "Model and loss";
@@ -249,9 +249,10 @@ fn one(
         ui.note(&format!("{}: note: {note}", file.display()));
     }
     let fitted = match args.model {
-        Wanted::Auto => fit_best_model(table, options)?,
-        Wanted::Model(_) => fit(table, options)?,
+        Wanted::Auto => fit_best_model(table, options),
+        Wanted::Model(_) => fit(table, options),
     };
+    let fitted = fitted.map_err(|error| refused(args, error))?;
     if args.log {
         log(&fitted, ui);
     }
@@ -266,6 +267,20 @@ fn one(
     let said = describe(&file.display().to_string(), &fitted.material)
         + &target.map_or(String::new(), |t| format!("  written to {}\n", t.display()));
     Ok((said, object))
+}
+
+/// Why there is no fit, with the options named as they were typed.
+fn refused(args: &Args, error: FitError) -> Failure {
+    let held = |name: &str| args.fix.iter().any(|limit| limit.parameter.to_string() == name);
+    let (before, after) = match &error {
+        FitError::Limit { name, .. } if held(name) => ("--fix ", ""),
+        FitError::Limit { .. } => ("--bound ", ""),
+        FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)"),
+        FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)"),
+        _ => ("", ""),
+    };
+    let failure = Failure::from(error);
+    Failure { message: format!("{before}{}{after}", failure.message), ..failure }
 }
 
 fn history(fitted: &Fitted) -> Vec<Value> {

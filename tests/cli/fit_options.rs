@@ -338,7 +338,7 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
     let b = Bench::new();
     b.paint("p.csv");
     b.write("plain.csv", csv(&[(30.0, 10.0, 0.0, 0.1), (30.0, 20.0, 0.0, 0.1)]));
-    let table: [(&[&str], &[&str]); 18] = [
+    let table: [(&[&str], &[&str]); 21] = [
         (&["p.csv", "--fix", "phong.exponent"], &["--fix", "NAME=VALUE"]),
         (&["p.csv", "--fix", "phong.sharpness=2"], &["--fix", "sharpness"]),
         (&["p.csv", "--bound", "phong.exponent=5..1"], &["--bound", "5..1 is empty"]),
@@ -351,17 +351,23 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
         (&["p.csv", "--target-rmse-excess", "little"], &["--target-rmse-excess", "1%"]),
         (&["p.csv", "--bootstrap", "1"], &["--bootstrap", "2..=100000"]),
         (&["p.csv", "--seed", "1"], &["--bootstrap"]),
-        (&["p.csv", "--stride", "0"], &["stride", "at least 1"]),
-        (&["plain.csv", "--use-sigma"], &["use-sigma", "states sigma"]),
+        (&["p.csv", "--stride", "0"], &["--stride: ", "at least 1"]),
+        (&["plain.csv", "--use-sigma"], &["--use-sigma: ", "states sigma"]),
+        (&["p.csv", "--max-angle", "100"], &["--max-angle: ", "(0, 90]"]),
+        (&["p.csv", "--model", "phong2d"], &["--model: ", "not flat"]),
         (
             &["p.csv", "--model", "lambert", "--fix", "phong.exponent=5"],
-            &["phong.exponent", "a lobe of the model lambert"],
+            &["--fix phong.exponent", "a lobe of the model lambert"],
         ),
-        (&["p.csv", "--fix", "phong[1].exponent=5"], &["phong[1].exponent", "lambert+phong"]),
-        (&["p.csv", "--fix", "lambert.weight[x]=0.5"], &["lambert.weight[x]", "r, g, b"]),
+        (&["p.csv", "--fix", "phong[1].exponent=5"], &["--fix phong[1].exponent", "lambert+phong", "found phong[1]"]),
+        (&["p.csv", "--bound", "lambert.weight[x]=0.5.."], &["--bound lambert.weight[x]", "r, g, b"]),
+        (
+            &["p.csv", "--bound", "phong.exponent=1e9.."],
+            &["--bound phong.exponent", "meets 0.01..", "found 1000000000..inf"],
+        ),
         (
             &["p.csv", "--conserve-energy", "--bound", "lambert.weight=0.9..", "--bound", "phong.weight=0.5.."],
-            &["channel r", "1.4", "energy conservation"],
+            &["--conserve-energy: ", "channel r", "1.4", "energy conservation", "--bound"],
         ),
     ];
     for (args, says) in table {
