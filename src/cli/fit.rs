@@ -319,7 +319,7 @@ fn describe(name: &str, material: &Material) -> String {
         for (c, weight) in lobe.weight.iter().enumerate() {
             let error = errors.and_then(|r| r.weight.get(c).copied().flatten());
             let interval = intervals.and_then(|r| r.weight.get(c).copied().flatten());
-            parameter(&mut t, &format!("{name}.weight[{}]", material.channels[c]), *weight, error, interval);
+            parameter(&mut t, record, &format!("{name}.weight[{}]", material.channels[c]), *weight, (error, interval));
         }
         let Some(shape) = &lobe.shape else {
             let _ = writeln!(t, "  {:22} undetermined: the lobe has no weight", format!("{name}.*"));
@@ -331,11 +331,11 @@ fn describe(name: &str, material: &Material) -> String {
             let at = |c: usize| (errors.and_then(|e| e.get(c)).flatten(), intervals.and_then(|e| e.get(c)).flatten());
             let label = format!("{name}.{}", known.name);
             match &shape[i] {
-                PerChannel::Shared(value) => parameter(&mut t, &label, *value, at(0).0, at(0).1),
+                PerChannel::Shared(value) => parameter(&mut t, record, &label, *value, at(0)),
                 PerChannel::Each(values) => {
                     for (c, value) in values.iter().enumerate() {
                         let label = format!("{label}[{}]", material.channels[c]);
-                        parameter(&mut t, &label, *value, at(c).0, at(c).1);
+                        parameter(&mut t, record, &label, *value, at(c));
                     }
                 }
             }
@@ -348,9 +348,17 @@ fn describe(name: &str, material: &Material) -> String {
     t
 }
 
+/// Standard error and 95 % interval of a parameter.
+type Stated = (Option<f64>, Option<(f64, f64)>);
+
 /// One line a parameter; its interval only where the error does not tell it: where it is lopsided.
-fn parameter(t: &mut String, label: &str, value: f64, error: Option<f64>, interval: Option<(f64, f64)>) {
-    let _ = write!(t, "  {label:22} {}", plus_minus(value, error));
+fn parameter(t: &mut String, record: &FitRecord, label: &str, value: f64, (error, interval): Stated) {
+    let open = record.undetermined.iter().any(|name| name == label);
+    let shown = match error {
+        None if !open => format!("{value:.6} (at the end of its range)"),
+        _ => plus_minus(value, error),
+    };
+    let _ = write!(t, "  {label:22} {shown}");
     if let Some((low, high)) = interval {
         let (below, above) = (value - low, high - value);
         if below.max(above) > LOPSIDED * below.min(above) {

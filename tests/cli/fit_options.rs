@@ -172,6 +172,17 @@ fn fixed_parameters_stay_and_bounds_hold() {
     let bounded = b.json(&["fit", "g.csv", "--bound", "phong.exponent=60..1e3"]);
     assert_eq!(bounded["fit"]["status"], "at-bound");
     assert!((exponent(&bounded, 1) / 60.0 - 1.0).abs() < 1e-12, "{}", exponent(&bounded, 1));
+    // At the end of a range: no standard error, yet not undetermined; the interval reaches inwards, and print and warning say so.
+    let record = &bounded["fit"];
+    assert!(record["standard_error"][1]["shape"]["exponent"].is_null(), "{}", record["standard_error"]);
+    assert!(record["standard_error"][1]["weight"][0].is_number(), "{}", record["standard_error"]);
+    assert_eq!(record["undetermined"], json!([]));
+    assert!(record["warnings"].to_string().contains("phong.exponent ended at the end"), "{}", record["warnings"]);
+    let ends = &record["interval_95"][1]["shape"]["exponent"];
+    let (low, high) = (number(&ends[0]), number(&ends[1]));
+    assert!((low / 60.0 - 1.0).abs() < 1e-12 && high > 60.0 && high < 70.0, "{low} to {high}");
+    let text = b.ok(&["fit", "g.csv", "--bound", "phong.exponent=60..1e3"]).text();
+    assert!(text.contains("(at the end of its range)") && !text.contains("undetermined"), "{text}");
     let bounded = b.json(&["fit", "g.csv", "--bound", "phong.weight=..0.1"]);
     assert!((weights(&bounded)[1] / 0.1 - 1.0).abs() < 1e-12, "{}", weights(&bounded)[1]);
     // Bounds that the optimum lies within change nothing.
