@@ -5,11 +5,12 @@ use std::time::{Duration, Instant};
 use super::bootstrap;
 use super::covariance::Uncertainty;
 use super::limits::Ranges;
+use super::loss::Loss;
 use super::options::{FitError, FitOptions};
 use super::part::{self, Part};
 use super::samples::{Samples, Thin};
 use crate::brdf::ModelSpec;
-use crate::measurement::Measurement;
+use crate::measurement::{Directions, Measurement};
 use crate::numeric::stats::chi_square_quantile;
 
 /// A part of the samples, and what that costs.
@@ -31,6 +32,8 @@ const GROWTH: usize = 4;
 const WORTH: usize = 20_000;
 /// Entries of the first round.
 const FIRST: usize = 6000;
+/// A whole table that is quick takes at most this many times as long as the first round.
+const WHOLE: f64 = 4.0;
 /// What is kept of the time for what a prediction misses.
 const RESERVE: f64 = 0.8;
 
@@ -50,20 +53,22 @@ pub(super) fn fit(
     time: Option<Duration>,
 ) -> Result<Part, FitError> {
     let clock = Instant::now();
+    let whole_is_quick = whole_is_quick(measurement, options);
     let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
     loop {
         let began = Instant::now();
         let (samples, transforms) =
             Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 })?;
         let mut part = part::fit(&samples, transforms, model, ranges, options)?;
-        let mut round = began.elapsed();
+        let round = began.elapsed();
         if thin > 1 {
             let mut subset = Subset::of(&part, thin);
             let met = options.target_rmse_excess.is_some_and(|target| subset.excess_95 <= target);
-            let next = (thin / GROWTH).max(1);
+            let (next, longer) = if whole_is_quick { (1, WHOLE) } else { next(thin) };
             if let Some(time) = time.filter(|_| !met) {
-                round += bootstrap::predicted(&samples, &part, model, ranges, options)?;
-                subset.out_of_time = !fits(time, clock.elapsed() + round.mul_f64(thin as f64 / next as f64));
+                let drawings = bootstrap::predicted(&samples, &part, model, ranges, options)?;
+                let needed = round.mul_f64(longer) + drawings.mul_f64(thin as f64 / next as f64);
+                subset.out_of_time = !fits(time, clock.elapsed() + needed);
             }
             if !met && !subset.out_of_time {
                 thin = next;
@@ -82,6 +87,19 @@ impl Subset {
         let (excess, excess_95) = excess(&part.uncertainty, 1.0 / thin as f64);
         Self { of: part.samples * thin, excess, excess_95, out_of_time: false }
     }
+}
+
+/// The next round's step, and how many times as long as the one before it may take.
+fn next(thin: usize) -> (usize, f64) {
+    let next = (thin / GROWTH).max(1);
+    (next, thin as f64 / next as f64)
+}
+
+/// Whether a whole table is folded in one pass, which takes no longer than listing a part of it. What a bootstrap redraws is listed.
+fn whole_is_quick(measurement: &Measurement, options: &FitOptions) -> bool {
+    let folds = options.loss.is_linear() && options.loss != Loss::Relative && options.robust.is_none();
+    let plain = !options.use_sigma && options.stride == 1 && options.bootstrap.is_none();
+    folds && plain && matches!(measurement.directions, Directions::Merl(_))
 }
 
 fn fits(budget: Duration, needed: Duration) -> bool {
