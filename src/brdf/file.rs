@@ -60,9 +60,9 @@ pub struct FitRecord {
     pub iterations: u64,
     /// Time of the fit alone, s.
     pub seconds: f64,
-    /// Standard errors, lobe by lobe; `null` where undetermined.
+    /// Standard errors, lobe by lobe; `null` where undetermined, and for a shape at the end of its range.
     pub standard_error: Vec<LobeRecord<Option<f64>>>,
-    /// 95 % intervals, lobe by lobe; `null` where undetermined.
+    /// 95 % intervals, lobe by lobe; one-sided for a shape at the end of its range; `null` where undetermined.
     pub interval_95: Vec<LobeRecord<Option<(f64, f64)>>>,
     /// Parameters that the data do not determine.
     pub undetermined: Vec<String>,

@@ -63,10 +63,11 @@ impl From<ImageError> for Failure {
 impl From<FitError> for Failure {
     fn from(error: FitError) -> Self {
         let message = error.to_string();
-        if matches!(error, FitError::Option { .. } | FitError::Limit { .. } | FitError::Infeasible { .. }) {
-            Self::usage(message)
-        } else {
-            Self::work(message)
+        match error {
+            FitError::Option { .. } => Self::usage(format!("--{message}")),
+            FitError::Infeasible { .. } => Self::usage(format!("--conserve-energy: {message}")),
+            FitError::Limit { .. } => Self::usage(message),
+            _ => Self::work(message),
         }
     }
 }

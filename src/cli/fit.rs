@@ -11,7 +11,7 @@ use super::info::Reading;
 use super::output::{check_folder, write_text};
 use super::ui::{self, Ui};
 use crate::brdf::{FitRecord, Material, ModelChoice, ModelSpec, PerChannel, SpecError};
-use crate::fit::{Bootstrap, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
+use crate::fit::{Bootstrap, FitError, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
 use crate::measurement::{Measurement, formats};
 
 const MODEL: &str = "Model and loss";
@@ -65,13 +65,13 @@ pub(super) struct Args {
     /// Fit under the constraint that no channel reflects more light than it receives
     #[arg(long, help_heading = MODEL)]
     conserve_energy: bool,
-    /// Time that the fit may take, 50ms or 2s say: it uses as many samples as that allows
+    /// Time that the fit may take, bootstrap included, 50ms or 2s say: it uses as many samples as that allows
     #[arg(long, value_name = "TIME", value_parser = parse_time, help_heading = EFFORT)]
     time_budget: Option<Duration>,
     /// Stop at a part of the samples once the rmse over all is within this share of the best (1%, say) with 95 % confidence
     #[arg(long, value_name = "SHARE", value_parser = parse_share, allow_hyphen_values = true, help_heading = EFFORT)]
     target_rmse_excess: Option<f64>,
-    /// Also find standard errors by redrawing the data N times
+    /// Also find standard errors by redrawing the data N times; where a budget or target ends the fit early, the samples it ended with
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000), help_heading = EFFORT)]
     bootstrap: Option<u32>,
     /// Seed of the redrawing
@@ -249,9 +249,10 @@ fn one(
         ui.note(&format!("{}: note: {note}", file.display()));
     }
     let fitted = match args.model {
-        Wanted::Auto => fit_best_model(table, options)?,
-        Wanted::Model(_) => fit(table, options)?,
+        Wanted::Auto => fit_best_model(table, options),
+        Wanted::Model(_) => fit(table, options),
     };
+    let fitted = fitted.map_err(|error| refused(args, error))?;
     if args.log {
         log(&fitted, ui);
     }
@@ -266,6 +267,20 @@ fn one(
     let said = describe(&file.display().to_string(), &fitted.material)
         + &target.map_or(String::new(), |t| format!("  written to {}\n", t.display()));
     Ok((said, object))
+}
+
+/// Why there is no fit, with the options named as they were typed.
+fn refused(args: &Args, error: FitError) -> Failure {
+    let held = |name: &str| args.fix.iter().any(|limit| limit.parameter.to_string() == name);
+    let (before, after) = match &error {
+        FitError::Limit { name, .. } if held(name) => ("--fix ", ""),
+        FitError::Limit { .. } => ("--bound ", ""),
+        FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)"),
+        FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)"),
+        _ => ("", ""),
+    };
+    let failure = Failure::from(error);
+    Failure { message: format!("{before}{}{after}", failure.message), ..failure }
 }
 
 fn history(fitted: &Fitted) -> Vec<Value> {
@@ -304,7 +319,7 @@ fn describe(name: &str, material: &Material) -> String {
         for (c, weight) in lobe.weight.iter().enumerate() {
             let error = errors.and_then(|r| r.weight.get(c).copied().flatten());
             let interval = intervals.and_then(|r| r.weight.get(c).copied().flatten());
-            parameter(&mut t, &format!("{name}.weight[{}]", material.channels[c]), *weight, error, interval);
+            parameter(&mut t, record, &format!("{name}.weight[{}]", material.channels[c]), *weight, (error, interval));
         }
         let Some(shape) = &lobe.shape else {
             let _ = writeln!(t, "  {:22} undetermined: the lobe has no weight", format!("{name}.*"));
@@ -316,11 +331,11 @@ fn describe(name: &str, material: &Material) -> String {
             let at = |c: usize| (errors.and_then(|e| e.get(c)).flatten(), intervals.and_then(|e| e.get(c)).flatten());
             let label = format!("{name}.{}", known.name);
             match &shape[i] {
-                PerChannel::Shared(value) => parameter(&mut t, &label, *value, at(0).0, at(0).1),
+                PerChannel::Shared(value) => parameter(&mut t, record, &label, *value, at(0)),
                 PerChannel::Each(values) => {
                     for (c, value) in values.iter().enumerate() {
                         let label = format!("{label}[{}]", material.channels[c]);
-                        parameter(&mut t, &label, *value, at(c).0, at(c).1);
+                        parameter(&mut t, record, &label, *value, at(c));
                     }
                 }
             }
@@ -333,9 +348,17 @@ fn describe(name: &str, material: &Material) -> String {
     t
 }
 
+/// Standard error and 95 % interval of a parameter.
+type Stated = (Option<f64>, Option<(f64, f64)>);
+
 /// One line a parameter; its interval only where the error does not tell it: where it is lopsided.
-fn parameter(t: &mut String, label: &str, value: f64, error: Option<f64>, interval: Option<(f64, f64)>) {
-    let _ = write!(t, "  {label:22} {}", plus_minus(value, error));
+fn parameter(t: &mut String, record: &FitRecord, label: &str, value: f64, (error, interval): Stated) {
+    let open = record.undetermined.iter().any(|name| name == label);
+    let shown = match error {
+        None if !open => format!("{value:.6} (at the end of its range)"),
+        _ => plus_minus(value, error),
+    };
+    let _ = write!(t, "  {label:22} {shown}");
     if let Some((low, high)) = interval {
         let (below, above) = (value - low, high - value);
         if below.max(above) > LOPSIDED * below.min(above) {

@@ -1,42 +1,64 @@
 //! Standard errors by redrawing the data: every sample's weight times a Poisson number of mean 1, refitted from the optimum.
 
+use std::time::{Duration, Instant};
+
 use nalgebra::DVector;
 use rand_distr::{Distribution, Poisson};
 
 use super::limits::Ranges;
-use super::options::{Bootstrap, FitError, FitOptions};
+use super::options::{FitError, FitOptions};
 use super::part::{self, Part};
 use super::reduced::Solution;
 use super::samples::Samples;
 use crate::brdf::ModelSpec;
 use crate::numeric::random::{Purpose, stream};
 
-/// Standard deviation of every parameter over the redrawn data.
+/// Standard deviation of every parameter over the redrawn data, where that is asked for.
 pub(super) fn bootstrap(
     samples: &Samples<'_>,
     part: &Part,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
-    draws: Bootstrap,
-) -> Result<Vec<f64>, FitError> {
-    let failed = |reason: String| FitError::Solver { reason };
-    let poisson = Poisson::new(1.0).map_err(|e| failed(e.to_string()))?;
+) -> Result<Option<Vec<f64>>, FitError> {
+    let Some(draws) = options.bootstrap else { return Ok(None) };
     let all = samples.listed(|_| true);
     let parameters = part.uncertainty.errors.len();
     let (mut sum, mut squares) = (DVector::<f64>::zeros(parameters), DVector::<f64>::zeros(parameters));
     let centre = flat(&part.solution);
     for replicate in 0..draws.replicates {
-        let mut rng = stream(draws.seed, Purpose::Bootstrap, u64::from(replicate));
-        let factor: Vec<f64> = (0..all.len()).map(|_| poisson.sample(&mut rng)).collect();
-        let redrawn = all.reweighted(&factor);
+        let redrawn = redrawn(&all, draws.seed, replicate)?;
         let solution = part::refit(&redrawn, part, model, ranges, options)?;
         let moved = flat(&solution) - &centre;
         squares += moved.component_mul(&moved);
         sum += moved;
     }
     let n = f64::from(draws.replicates);
-    Ok(squares.iter().zip(sum.iter()).map(|(q, s)| ((q - s * s / n) / (n - 1.0)).max(0.0).sqrt()).collect())
+    let deviation = |(q, s): (&f64, &f64)| ((q - s * s / n) / (n - 1.0)).max(0.0).sqrt();
+    Ok(Some(squares.iter().zip(sum.iter()).map(deviation).collect()))
+}
+
+/// How long that would take, by the time of the first replicate.
+pub(super) fn predicted(
+    samples: &Samples<'_>,
+    part: &Part,
+    model: &ModelSpec,
+    ranges: &Ranges,
+    options: &FitOptions,
+) -> Result<Duration, FitError> {
+    let Some(draws) = options.bootstrap else { return Ok(Duration::ZERO) };
+    let all = samples.listed(|_| true);
+    let began = Instant::now();
+    part::refit(&redrawn(&all, draws.seed, 0)?, part, model, ranges, options)?;
+    Ok(began.elapsed() * draws.replicates)
+}
+
+/// The data of one replicate.
+fn redrawn<'a>(all: &Samples<'a>, seed: u64, replicate: u32) -> Result<Samples<'a>, FitError> {
+    let poisson = Poisson::new(1.0).map_err(|e| FitError::Solver { reason: e.to_string() })?;
+    let mut rng = stream(seed, Purpose::Bootstrap, u64::from(replicate));
+    let factor: Vec<f64> = (0..all.len()).map(|_| poisson.sample(&mut rng)).collect();
+    Ok(all.reweighted(&factor))
 }
 
 /// All parameters in a row: weights channel by channel, then t.

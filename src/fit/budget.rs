@@ -2,13 +2,15 @@
 
 use std::time::{Duration, Instant};
 
+use super::bootstrap;
 use super::covariance::Uncertainty;
 use super::limits::Ranges;
+use super::loss::Loss;
 use super::options::{FitError, FitOptions};
 use super::part::{self, Part};
 use super::samples::{Samples, Thin};
 use crate::brdf::ModelSpec;
-use crate::measurement::Measurement;
+use crate::measurement::{Directions, Measurement};
 use crate::numeric::stats::chi_square_quantile;
 
 /// A part of the samples, and what that costs.
@@ -30,38 +32,74 @@ const GROWTH: usize = 4;
 const WORTH: usize = 20_000;
 /// Entries of the first round.
 const FIRST: usize = 6000;
+/// A whole table that is quick takes at most this many times as long as the first round.
+const WHOLE: f64 = 4.0;
 /// What is kept of the time for what a prediction misses.
 const RESERVE: f64 = 0.8;
 
+/// The time that one of `left` fits may take, of what is left of the budget: all alike, whatever the earlier ones took.
+pub(super) fn share(budget: Duration, elapsed: Duration, left: usize) -> Duration {
+    budget.saturating_sub(elapsed) / u32::try_from(left.max(1)).unwrap_or(u32::MAX)
+}
+
 /// Fits growing parts of the samples until the target is met or the time would be exceeded; all of them where that is possible.
+/// What is asked for beside the fit is made of the samples that it ended with, and its time counts too.
 pub(super) fn fit(
     measurement: &Measurement,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
     channels: &[usize],
-    clock: Instant,
+    time: Option<Duration>,
 ) -> Result<Part, FitError> {
+    let clock = Instant::now();
+    let whole_is_quick = whole_is_quick(measurement, options);
     let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
     loop {
         let began = Instant::now();
         let (samples, transforms) =
             Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 })?;
         let mut part = part::fit(&samples, transforms, model, ranges, options)?;
-        if thin == 1 {
-            return Ok(part);
+        let round = began.elapsed();
+        if thin > 1 {
+            let mut subset = Subset::of(&part, thin);
+            let met = options.target_rmse_excess.is_some_and(|target| subset.excess_95 <= target);
+            let (next, longer) = if whole_is_quick { (1, WHOLE) } else { next(thin) };
+            if let Some(time) = time.filter(|_| !met) {
+                let drawings = bootstrap::predicted(&samples, &part, model, ranges, options)?;
+                let needed = round.mul_f64(longer) + drawings.mul_f64(thin as f64 / next as f64);
+                subset.out_of_time = !fits(time, clock.elapsed() + needed);
+            }
+            if !met && !subset.out_of_time {
+                thin = next;
+                continue;
+            }
+            part.subset = Some(subset);
         }
-        let (excess, excess_95) = excess(&part.uncertainty, 1.0 / thin as f64);
-        let next = (thin / GROWTH).max(1);
-        let met = options.target_rmse_excess.is_some_and(|target| excess_95 <= target);
-        let grown = began.elapsed().mul_f64(thin as f64 / next as f64);
-        let out_of_time = options.time_budget.is_some_and(|budget| !fits(budget, clock.elapsed() + grown));
-        if met || out_of_time {
-            part.subset = Some(Subset { of: part.samples * thin, excess, excess_95, out_of_time: out_of_time && !met });
-            return Ok(part);
-        }
-        thin = next;
+        part.bootstrap = bootstrap::bootstrap(&samples, &part, model, ranges, options)?;
+        return Ok(part);
     }
+}
+
+impl Subset {
+    /// Of a fit to one of every `thin` samples.
+    fn of(part: &Part, thin: usize) -> Self {
+        let (excess, excess_95) = excess(&part.uncertainty, 1.0 / thin as f64);
+        Self { of: part.samples * thin, excess, excess_95, out_of_time: false }
+    }
+}
+
+/// The next round's step, and how many times as long as the one before it may take.
+fn next(thin: usize) -> (usize, f64) {
+    let next = (thin / GROWTH).max(1);
+    (next, thin as f64 / next as f64)
+}
+
+/// Whether a whole table is folded in one pass, which takes no longer than listing a part of it. What a bootstrap redraws is listed.
+fn whole_is_quick(measurement: &Measurement, options: &FitOptions) -> bool {
+    let folds = options.loss.is_linear() && options.loss != Loss::Relative && options.robust.is_none();
+    let plain = !options.use_sigma && options.stride == 1 && options.bootstrap.is_none();
+    folds && plain && matches!(measurement.directions, Directions::Merl(_))
 }
 
 fn fits(budget: Duration, needed: Duration) -> bool {
@@ -84,4 +122,20 @@ fn excess(part: &Uncertainty, share: f64) -> (f64, f64) {
     let relative = |rise: f64| (1.0 + (1.0 - share) * rise / part.cost).sqrt() - 1.0;
     let bound = second / first * chi_square_quantile(0.95, first * first / second);
     (relative(first), relative(bound))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_channel_has_its_share_of_what_is_left() {
+        let ms = Duration::from_millis;
+        assert_eq!(share(ms(300), ms(0), 3), ms(100));
+        // The first took less than its share, then more.
+        assert_eq!(share(ms(300), ms(40), 2), ms(130));
+        assert_eq!(share(ms(300), ms(220), 2), ms(40));
+        assert_eq!(share(ms(300), ms(200), 1), ms(100));
+        assert_eq!(share(ms(300), ms(400), 1), Duration::ZERO);
+    }
 }

@@ -1,6 +1,7 @@
 //! 95 % intervals. Where a parameter is nonlinear or near the end of its range the interval is read off its profile: the values at which the
 //! cost, minimised over everything else, has risen by as much as the standard error's own curvature says for 95 % (the
 //! profile calibrated by the sandwich: Chandler & Bate 2007). Elsewhere it is estimate ± t·σ, for exponents in their logarithm.
+//! A shape at an end of its range has an interval by profile alone, from that end inwards.
 
 use nalgebra::DVector;
 
@@ -18,15 +19,25 @@ const RESOLVED: f64 = 1e-11;
 /// Steps of the search for each end.
 const STEPS: usize = 40;
 
-/// Estimate ± t·σ of every parameter, cut to its range.
+/// Whether parameter `i` is a shape that ended at an end of its range, though the data determine it: the cost falls on beyond that end, so that
+/// no parabola, and no standard error, tells where the parameter may be.
+pub(super) fn is_at_end(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty, i: usize) -> bool {
+    let Some(shape) = i.checked_sub(at.weights.len() * problem.kinds.len()) else { return false };
+    let ((low, high), lobe) = (problem.bounds[shape], problem.layout[shape].0);
+    let determined = uncertainty.errors[i].is_some_and(|e| e < high - low);
+    let ends = low < high && (at.t[shape] <= low || at.t[shape] >= high);
+    ends && determined && at.weights.iter().any(|x| x[lobe] > 0.0)
+}
+
+/// Estimate ± t·σ of every parameter, cut to its range; none for a shape at an end of it.
 pub(super) fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
     let q = uncertainty.quantile;
-    let around = |(i, error): (usize, &Option<f64>)| {
-        let error = (*error)?;
+    let around = |i: usize| {
+        let error = uncertainty.errors[i].filter(|_| !is_at_end(problem, at, uncertainty, i))?;
         let (value, (low, high)) = parameter(problem, at, i);
         Some(((value - q * error).max(low), (value + q * error).min(high)))
     };
-    uncertainty.errors.iter().enumerate().map(around).collect()
+    (0..uncertainty.errors.len()).map(around).collect()
 }
 
 /// [`plain`], by profile where that differs.
@@ -36,11 +47,13 @@ pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncerta
     let energy: f64 = search.energy.iter().sum();
     let weights = at.weights.len() * problem.kinds.len();
     for (i, interval) in intervals.iter_mut().enumerate() {
-        let (Some(error), Some(plain)) = (uncertainty.errors[i], *interval) else { continue };
+        let Some(error) = uncertainty.errors[i] else { continue };
         let (value, (low, high)) = parameter(problem, at, i);
         let reach = uncertainty.quantile * error;
+        let at_end = is_at_end(problem, at, uncertainty, i);
         let near_end = i < weights && (value - low < 1.5 * reach || high - value < 1.5 * reach);
-        if low == high || !(near_end && !problem.layout.is_empty() || i >= weights && reach > NARROW) {
+        let lopsided = near_end && !problem.layout.is_empty() || i >= weights && reach > NARROW;
+        if low == high || !(lopsided || at_end) {
             continue;
         }
         let rise = reach * reach / uncertainty.bread[(i, i)];
@@ -48,7 +61,8 @@ pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncerta
             continue;
         }
         let profile = Profile { search, at, parameter: i, rise };
-        *interval = Some((profile.end(value, plain.0.min(value), low), profile.end(value, plain.1.max(value), high)));
+        let (below, above) = ((value - reach).max(low).min(value), (value + reach).min(high).max(value));
+        *interval = Some((profile.end(value, below, low), profile.end(value, above, high)));
     }
     intervals
 }

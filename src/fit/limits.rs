@@ -117,12 +117,19 @@ fn bracketed(text: &str) -> Result<(&str, Option<&str>), String> {
     }
 }
 
+impl ParameterName {
+    /// Its lobe: `phong`, `phong[1]` for the second of the kind.
+    fn lobe(&self) -> String {
+        match self.occurrence {
+            0 => self.kind.name().into(),
+            k => format!("{}[{k}]", self.kind.name()),
+        }
+    }
+}
+
 impl fmt::Display for ParameterName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.kind.name())?;
-        if self.occurrence > 0 {
-            write!(f, "[{}]", self.occurrence)?;
-        }
+        f.write_str(&self.lobe())?;
         match &self.field {
             Field::Weight(None) => write!(f, ".weight"),
             Field::Weight(Some(channel)) => write!(f, ".weight[{channel}]"),
@@ -157,17 +164,19 @@ impl Ranges {
 
     fn apply(&mut self, model: &ModelSpec, channels: &[String], limit: &Limit) -> Result<(), FitError> {
         let name = &limit.parameter;
-        let wrong = |expected| FitError::Limit { name: name.to_string(), expected };
+        let wrong = |expected, found| FitError::Limit { name: name.to_string(), expected, found };
         let kind = if model.is_flat() { name.kind.flat_twin() } else { name.kind };
         let mut of_kind = model.lobes().iter().enumerate().filter(|(_, k)| **k == kind);
-        let (lobe, _) = of_kind.nth(name.occurrence).ok_or_else(|| wrong(format!("a lobe of the model {model}")))?;
+        let (lobe, _) =
+            of_kind.nth(name.occurrence).ok_or_else(|| wrong(format!("a lobe of the model {model}"), name.lobe()))?;
         self.limited.push(kind);
         match &name.field {
             Field::Weight(channel) => {
                 let chosen: Vec<usize> =
                     (0..channels.len()).filter(|&c| channel.as_ref().is_none_or(|n| *n == channels[c])).collect();
                 if chosen.is_empty() {
-                    return Err(wrong(format!("a channel of {}", channels.join(", "))));
+                    let found = channel.clone().unwrap_or_default();
+                    return Err(wrong(format!("a channel of {}", channels.join(", ")), found));
                 }
                 for c in chosen {
                     self.weights[c][lobe] = (limit.low, limit.high);
@@ -179,7 +188,8 @@ impl Ranges {
                 let own = parameters.iter().position(|p| p.name == shape).unwrap_or(0);
                 let (low, high) = parameters[own].bounds;
                 if limit.low > high || limit.high < if limit.low == limit.high { 0.0 } else { low } {
-                    return Err(wrong(format!("a range that meets {low}..{high}")));
+                    let found = format!("{}..{}", limit.low, limit.high);
+                    return Err(wrong(format!("a range that meets {low}..{high}"), found));
                 }
                 // A fixed shape may lie below the range that is searched, at n = 0 say.
                 let fixed = limit.low == limit.high;

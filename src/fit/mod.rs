@@ -33,7 +33,7 @@ mod structure;
 mod tally;
 mod transform;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::brdf::{Material, ModelSpec};
 use crate::measurement::Measurement;
@@ -71,8 +71,9 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let all: Vec<usize> = (0..measurement.channels.len()).collect();
     let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![&all] };
     let mut parts = Vec::new();
-    for group in &groups {
-        parts.push(fit_part(measurement, &model, &ranges, options, group, clock)?);
+    for (done, group) in groups.iter().enumerate() {
+        let time = options.time_budget.map(|budget| budget::share(budget, clock.elapsed(), groups.len() - done));
+        parts.push(fit_part(measurement, &model, &ranges, options, group, time)?);
     }
     let samples = if let [part] = &parts[..] {
         part.samples
@@ -91,22 +92,20 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     Ok(Fitted { material, history, stop })
 }
 
-/// The fit of channels that share their shapes, to as many samples as the time or the target asks for.
+/// The fit of channels that share their shapes, to as many samples as their time or the target asks for.
 fn fit_part(
     measurement: &Measurement,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
     channels: &[usize],
-    clock: Instant,
+    time: Option<Duration>,
 ) -> Result<part::Part, FitError> {
-    if options.time_budget.is_some() || options.target_rmse_excess.is_some() {
-        return budget::fit(measurement, model, ranges, options, channels, clock);
+    if time.is_some() || options.target_rmse_excess.is_some() {
+        return budget::fit(measurement, model, ranges, options, channels, time);
     }
     let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin::NONE)?;
     let mut part = part::fit(&samples, transforms, model, ranges, options)?;
-    if let Some(draws) = options.bootstrap {
-        part.bootstrap = Some(bootstrap::bootstrap(&samples, &part, model, ranges, options, draws)?);
-    }
+    part.bootstrap = bootstrap::bootstrap(&samples, &part, model, ranges, options)?;
     Ok(part)
 }

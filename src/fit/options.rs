@@ -106,8 +106,8 @@ impl FitOptions {
         if let Some(robust) = self.robust.filter(|r| !(r.scale > 0.0 && r.scale.is_finite())) {
             return wrong("robust", "a positive scale", robust.scale.to_string());
         }
-        if self.bootstrap.is_some_and(|b| b.replicates < 2) {
-            return wrong("bootstrap", "at least 2 replicates", "fewer".into());
+        if let Some(few) = self.bootstrap.filter(|b| b.replicates < 2) {
+            return wrong("bootstrap", "at least 2 replicates", few.replicates.to_string());
         }
         if self.use_sigma && measurement.sigma.is_none() {
             return wrong("use-sigma", "a measurement that states sigma", "none stated".into());
@@ -136,7 +136,7 @@ pub enum FitError {
     /// An option out of its range.
     #[error("{field}: expected {expected}, found {found}")]
     Option {
-        /// Which.
+        /// Which, as on the command line.
         field: &'static str,
         /// Its range.
         expected: &'static str,
@@ -144,12 +144,14 @@ pub enum FitError {
         found: String,
     },
     /// A limit that fits nothing.
-    #[error("{name}: there is no such parameter to limit; expected {expected}")]
+    #[error("{name}: expected {expected}, found {found}")]
     Limit {
         /// The parameter as it was named.
         name: String,
         /// What it could have been.
         expected: String,
+        /// What of it does not fit.
+        found: String,
     },
     /// Limits that can't all be met.
     #[error(

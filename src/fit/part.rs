@@ -36,6 +36,8 @@ pub(super) struct Part {
     pub bounds: Vec<(f64, f64)>,
     pub solution: Solution,
     pub uncertainty: Uncertainty,
+    /// Whether each shape ended at an end of its range, so that it has no standard error.
+    pub at_end: Vec<bool>,
     pub intervals: Intervals,
     pub saturation: Saturation,
     pub structure: Option<Structure>,
@@ -219,7 +221,7 @@ fn failed(error: argmin::core::Error) -> FitError {
 fn finish(
     problem: &Problem<'_>,
     solution: Solution,
-    uncertainty: Uncertainty,
+    mut uncertainty: Uncertainty,
     intervals: Intervals,
     found: start::Found,
 ) -> Result<Part, FitError> {
@@ -231,6 +233,12 @@ fn finish(
     let rmse = (solution.cost / residuals.max(1) as f64).sqrt();
     let (sum, known) = uncertainty.stated;
     let stated = (known == residuals && known > 0).then(|| (sum / residuals as f64).sqrt());
+    let weights = solution.weights.len() * problem.kinds.len();
+    let at_end: Vec<bool> = (weights..uncertainty.errors.len())
+        .map(|i| intervals::is_at_end(problem, &solution, &uncertainty, i))
+        .collect();
+    let errors = uncertainty.errors[weights..].iter_mut();
+    errors.zip(&at_end).filter(|(_, ends)| **ends).for_each(|(error, _)| *error = None);
     Ok(Part {
         channels: samples.channels.clone(),
         scale: samples.scale,
@@ -255,6 +263,7 @@ fn finish(
         report: found.report,
         solution,
         uncertainty,
+        at_end,
         intervals,
         subset: None,
         bootstrap: None,

@@ -29,7 +29,12 @@ struct Row {
     interval: LobeRecord<Option<(f64, f64)>>,
     model_error: LobeRecord<Option<f64>>,
     bootstrap: LobeRecord<Option<f64>>,
+    /// Whether a shape ended at an end of its range.
+    at_end: Shapes<bool>,
 }
+
+/// Shape parameters of a lobe by name.
+type Shapes<T> = Vec<(String, PerChannel<T>)>;
 
 /// Correlations of more parameters than this are left out.
 const MOST_CORRELATED: usize = 40;
@@ -43,7 +48,7 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
     let mut material = Material { channels: facts.measurement.channels.clone(), lobes: Vec::new(), fit: None };
     let mut record = facts.numbers();
     let structured = record.residual.as_ref().is_some_and(|r| r.structured_share > STRUCTURED);
-    let mut redrawn = Vec::new();
+    let (mut redrawn, mut at_end) = (Vec::new(), Vec::new());
     let mut sorted: Vec<Option<Row>> = rows.drain(..).map(Some).collect();
     for row in order.iter().filter_map(|&l| sorted[l].take()) {
         material.lobes.push(row.term);
@@ -53,15 +58,18 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
             record.model_error.push(row.model_error);
         }
         redrawn.push(row.bootstrap);
+        at_end.push(row.at_end);
     }
     record.bootstrap = facts
         .options
         .bootstrap
         .map(|b| BootstrapRecord { replicates: u64::from(b.replicates), standard_error: redrawn });
-    record.undetermined = undetermined(&material, &record.standard_error);
+    let at_end = at_end_names(&material, &at_end);
+    record.undetermined = without_error(&material, &record.standard_error);
+    record.undetermined.retain(|name| !at_end.contains(name));
     record.correlation = facts.correlation(&order);
     record.energy = energy::energy(&material, facts.options.conserve_energy);
-    record.warnings = facts.warnings(&material, &record);
+    record.warnings = facts.warnings(&material, &record, &at_end);
     material.fit = Some(record);
     material
 }
@@ -183,6 +191,7 @@ impl Facts<'_> {
             interval: LobeRecord { weight: channels.clone().map(interval).collect(), shape: Vec::new() },
             model_error: LobeRecord { weight: channels.clone().map(model_error).collect(), shape: Vec::new() },
             bootstrap: LobeRecord { weight: channels.map(redrawn).collect(), shape: Vec::new() },
+            at_end: Vec::new(),
         };
         let dark = row.term.weight.iter().all(|w| *w == 0.0);
         let mut shape = Vec::new();
@@ -195,6 +204,7 @@ impl Facts<'_> {
             row.interval.shape.push((name(), shared(&values, |v| v.interval)));
             row.model_error.shape.push((name(), shared(&values, |v| v.model_error)));
             row.bootstrap.shape.push((name(), shared(&values, |v| v.bootstrap)));
+            row.at_end.push((name(), shared(&values, |v| v.at_end)));
         }
         if !dark || shape.is_empty() {
             row.term.shape = Some(shape);
@@ -251,15 +261,19 @@ impl Facts<'_> {
         Some(Correlation { parameters, matrix })
     }
 
-    fn warnings(&self, material: &Material, record: &FitRecord) -> Vec<String> {
+    fn warnings(&self, material: &Material, record: &FitRecord, at_end: &[String]) -> Vec<String> {
         let mut list = Vec::new();
         if !record.undetermined.is_empty() {
             list.push(format!("the data do not determine {}", record.undetermined.join(", ")));
         }
-        if record.status == "at-bound" {
-            list.push(
-                "a shape parameter ended at the end of its range: the data ask for more than the model has".into(),
-            );
+        if !at_end.is_empty() {
+            list.push(format!(
+                "{} ended at the end of its range: the data ask for more than the range has, so there is no standard error; an interval \
+                 reaches from that end inwards",
+                at_end.join(", ")
+            ));
+        } else if record.status == "at-bound" {
+            list.push("a shape parameter ended at the end of its range".into());
         }
         if record.status == "max-iterations" {
             list.push("the search used up its steps before it converged".into());
@@ -306,12 +320,14 @@ impl Facts<'_> {
 }
 
 /// A shape parameter of one part, in natural units.
+#[derive(Default)]
 struct ShapeValue {
     value: f64,
     error: Option<f64>,
     interval: Option<(f64, f64)>,
     model_error: Option<f64>,
     bootstrap: Option<f64>,
+    at_end: bool,
 }
 
 impl Part {
@@ -323,7 +339,7 @@ impl Part {
     fn shape_value(&self, l: usize, own: usize, ranges: &[(f64, f64)]) -> ShapeValue {
         let of_lobe = self.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l).map(|(i, _)| i);
         let Some(i) = of_lobe.clone().nth(own) else {
-            return ShapeValue { value: f64::NAN, error: None, interval: None, model_error: None, bootstrap: None };
+            return ShapeValue { value: f64::NAN, ..ShapeValue::default() };
         };
         let value = self.solution.t[i].exp();
         let place = self.solution.weights.len() * self.solution.lobes.len() + i;
@@ -333,14 +349,24 @@ impl Part {
             let value = if value <= 2.0 * TINY_SHAPE { 0.0 } else { ranges[i].0 };
             let nothing = Some(0.0);
             let interval = Some((value, value));
-            return ShapeValue { value, error: nothing, interval, model_error: nothing, bootstrap: nothing };
+            let at_end = false;
+            return ShapeValue { value, error: nothing, interval, model_error: nothing, bootstrap: nothing, at_end };
         }
         // An error wider than the whole range that is searched means that the data leave the shape open.
         let error = self.uncertainty.errors[place].filter(|e| self.lit(l) && *e < high - low);
-        let interval = error.and_then(|_| self.intervals[place]).map(|(low, high)| (low.exp(), high.exp()));
+        let at_end = self.at_end[i];
+        let known = error.is_some() || at_end;
+        let interval = self.intervals[place].filter(|_| known).map(|(low, high)| (low.exp(), high.exp()));
         let model_error = error.map(|_| self.uncertainty.structured[place] * value);
         let bootstrap = error.and(self.bootstrap.as_ref()).map(|b| b[place] * value);
-        ShapeValue { value, error: error.map(|e| e * value), interval: finite(interval), model_error, bootstrap }
+        ShapeValue {
+            value,
+            error: error.map(|e| e * value),
+            interval: finite(interval),
+            model_error,
+            bootstrap,
+            at_end,
+        }
     }
 }
 
@@ -390,20 +416,33 @@ fn lobe_name(kinds: &[LobeKind], l: usize) -> String {
 }
 
 /// Names of the parameters without a standard error: `phong.exponent`, `lambert.weight[g]`, `phong[1].exponent`.
-fn undetermined(material: &Material, errors: &[LobeRecord<Option<f64>>]) -> Vec<String> {
+fn without_error(material: &Material, errors: &[LobeRecord<Option<f64>>]) -> Vec<String> {
     let mut names = Vec::new();
     for (l, error) in errors.iter().enumerate() {
         let lobe = material.lobe_name(l);
         let open = error.weight.iter().zip(&material.channels).filter(|(e, _)| e.is_none());
         names.extend(open.map(|(_, c)| format!("{lobe}.weight[{c}]")));
-        for (name, error) in &error.shape {
-            match error {
-                PerChannel::Shared(error) if error.is_none() => names.push(format!("{lobe}.{name}")),
-                PerChannel::Shared(_) => {}
-                PerChannel::Each(list) => {
-                    let open = list.iter().zip(&material.channels).filter(|(e, _)| e.is_none());
-                    names.extend(open.map(|(_, c)| format!("{lobe}.{name}[{c}]")));
-                }
+        names.extend(shape_names(material, l, &error.shape, Option::is_none));
+    }
+    names
+}
+
+/// Names of the shapes that ended at an end of their range.
+fn at_end_names(material: &Material, at_end: &[Shapes<bool>]) -> Vec<String> {
+    let of_lobe = |(l, shapes)| shape_names(material, l, shapes, |ends| *ends);
+    at_end.iter().enumerate().flat_map(of_lobe).collect()
+}
+
+/// Names of the shapes of lobe `l` for which something holds.
+fn shape_names<T>(material: &Material, l: usize, shapes: &Shapes<T>, holds: impl Fn(&T) -> bool) -> Vec<String> {
+    let lobe = material.lobe_name(l);
+    let mut names = Vec::new();
+    for (name, value) in shapes {
+        match value {
+            PerChannel::Shared(value) => names.extend(holds(value).then(|| format!("{lobe}.{name}"))),
+            PerChannel::Each(list) => {
+                let chosen = list.iter().zip(&material.channels).filter(|(value, _)| holds(value));
+                names.extend(chosen.map(|(_, c)| format!("{lobe}.{name}[{c}]")));
             }
         }
     }

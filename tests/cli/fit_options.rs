@@ -172,6 +172,17 @@ fn fixed_parameters_stay_and_bounds_hold() {
     let bounded = b.json(&["fit", "g.csv", "--bound", "phong.exponent=60..1e3"]);
     assert_eq!(bounded["fit"]["status"], "at-bound");
     assert!((exponent(&bounded, 1) / 60.0 - 1.0).abs() < 1e-12, "{}", exponent(&bounded, 1));
+    // At the end of a range: no standard error, yet not undetermined; the interval reaches inwards, and print and warning say so.
+    let record = &bounded["fit"];
+    assert!(record["standard_error"][1]["shape"]["exponent"].is_null(), "{}", record["standard_error"]);
+    assert!(record["standard_error"][1]["weight"][0].is_number(), "{}", record["standard_error"]);
+    assert_eq!(record["undetermined"], json!([]));
+    assert!(record["warnings"].to_string().contains("phong.exponent ended at the end"), "{}", record["warnings"]);
+    let ends = &record["interval_95"][1]["shape"]["exponent"];
+    let (low, high) = (number(&ends[0]), number(&ends[1]));
+    assert!((low / 60.0 - 1.0).abs() < 1e-12 && high > 60.0 && high < 70.0, "{low} to {high}");
+    let text = b.ok(&["fit", "g.csv", "--bound", "phong.exponent=60..1e3"]).text();
+    assert!(text.contains("(at the end of its range)") && !text.contains("undetermined"), "{text}");
     let bounded = b.json(&["fit", "g.csv", "--bound", "phong.weight=..0.1"]);
     assert!((weights(&bounded)[1] / 0.1 - 1.0).abs() < 1e-12, "{}", weights(&bounded)[1]);
     // Bounds that the optimum lies within change nothing.
@@ -248,6 +259,37 @@ fn a_budget_ends_the_work_and_says_what_that_costs() {
 }
 
 #[test]
+fn a_bootstrap_is_drawn_from_the_samples_that_a_budget_or_target_ended_with() {
+    let b = Bench::new();
+    large(&b);
+    for (option, value) in [("--target-rmse-excess", "2%"), ("--time-budget", "1us")] {
+        let fit = b.json(&["fit", "large.csv", option, value, "--bootstrap", "30"]);
+        assert!(fit["fit"]["subset"].is_object(), "{option}: a part of the samples");
+        let error = |of: &Value, lobe: usize| {
+            let record = &of["standard_error"][lobe];
+            [number(&record["weight"][0]), record["shape"]["exponent"].as_f64().unwrap_or(f64::NAN)]
+        };
+        let (drawn, known) = (error(&fit["fit"]["bootstrap"], 1), error(&fit["fit"], 1));
+        // A standard deviation of 30 drawings scatters by 1/√58 = 13 %.
+        for (drawn, known) in drawn.iter().zip(known) {
+            assert!((0.4..2.5).contains(&(drawn / known)), "{option}: {drawn} vs {known}");
+        }
+    }
+}
+
+#[test]
+fn channels_apart_are_all_fitted_within_a_budget() {
+    let b = Bench::new();
+    large(&b);
+    let fit = b.json(&["fit", "large.csv", "--per-channel", "--time-budget", "1us", "--bootstrap", "2"]);
+    assert_eq!(fit["fit"]["status"], "budget");
+    let exponents = fit["lobes"][1]["shape"]["exponent"].as_array().expect("one a channel");
+    assert!(exponents.iter().all(|n| (number(n) / 90.0 - 1.0).abs() < 0.05), "{exponents:?}");
+    let drawn = fit["fit"]["bootstrap"]["standard_error"][1]["shape"]["exponent"].as_array().expect("one a channel");
+    assert!(drawn.len() == 3 && drawn.iter().all(Value::is_number), "{drawn:?}");
+}
+
+#[test]
 fn a_bootstrap_agrees_with_the_analytic_errors_and_depends_on_its_seed_alone() {
     let b = Bench::new();
     b.paint("p.csv");
@@ -307,7 +349,7 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
     let b = Bench::new();
     b.paint("p.csv");
     b.write("plain.csv", csv(&[(30.0, 10.0, 0.0, 0.1), (30.0, 20.0, 0.0, 0.1)]));
-    let table: [(&[&str], &[&str]); 18] = [
+    let table: [(&[&str], &[&str]); 21] = [
         (&["p.csv", "--fix", "phong.exponent"], &["--fix", "NAME=VALUE"]),
         (&["p.csv", "--fix", "phong.sharpness=2"], &["--fix", "sharpness"]),
         (&["p.csv", "--bound", "phong.exponent=5..1"], &["--bound", "5..1 is empty"]),
@@ -320,17 +362,23 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
         (&["p.csv", "--target-rmse-excess", "little"], &["--target-rmse-excess", "1%"]),
         (&["p.csv", "--bootstrap", "1"], &["--bootstrap", "2..=100000"]),
         (&["p.csv", "--seed", "1"], &["--bootstrap"]),
-        (&["p.csv", "--stride", "0"], &["stride", "at least 1"]),
-        (&["plain.csv", "--use-sigma"], &["use-sigma", "states sigma"]),
+        (&["p.csv", "--stride", "0"], &["--stride: ", "at least 1"]),
+        (&["plain.csv", "--use-sigma"], &["--use-sigma: ", "states sigma"]),
+        (&["p.csv", "--max-angle", "100"], &["--max-angle: ", "(0, 90]"]),
+        (&["p.csv", "--model", "phong2d"], &["--model: ", "not flat"]),
         (
             &["p.csv", "--model", "lambert", "--fix", "phong.exponent=5"],
-            &["phong.exponent", "a lobe of the model lambert"],
+            &["--fix phong.exponent", "a lobe of the model lambert"],
         ),
-        (&["p.csv", "--fix", "phong[1].exponent=5"], &["phong[1].exponent", "lambert+phong"]),
-        (&["p.csv", "--fix", "lambert.weight[x]=0.5"], &["lambert.weight[x]", "r, g, b"]),
+        (&["p.csv", "--fix", "phong[1].exponent=5"], &["--fix phong[1].exponent", "lambert+phong", "found phong[1]"]),
+        (&["p.csv", "--bound", "lambert.weight[x]=0.5.."], &["--bound lambert.weight[x]", "r, g, b"]),
+        (
+            &["p.csv", "--bound", "phong.exponent=1e9.."],
+            &["--bound phong.exponent", "meets 0.01..", "found 1000000000..inf"],
+        ),
         (
             &["p.csv", "--conserve-energy", "--bound", "lambert.weight=0.9..", "--bound", "phong.weight=0.5.."],
-            &["channel r", "1.4", "energy conservation"],
+            &["--conserve-energy: ", "channel r", "1.4", "energy conservation", "--bound"],
         ),
     ];
     for (args, says) in table {

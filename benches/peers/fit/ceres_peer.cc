@@ -109,7 +109,7 @@ int main(int argc, char** argv) {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
     options.num_threads = std::atoi(argv[3]);
-    options.function_tolerance = 1e-8;
+    options.function_tolerance = 1e-9;
     options.max_num_iterations = 200;
     options.logging_type = ceres::SILENT;
     ceres::Solve(options, &problem, &summary);

@@ -1,0 +1,210 @@
+//! What accuracy costs in time, and whether a fit to a part of the samples is as good as it says: `cargo bench --bench budget` prints a
+//! Markdown table for whole MERL tables and exits with 1 where a stated 95 % bound holds too seldom; `-- --quick` does a tenth of the tables.
+#![allow(clippy::expect_used)] // a bench may fail loudly
+
+use std::time::{Duration, Instant};
+
+use goniofit::brdf::{FitRecord, LobeKind, Material};
+use goniofit::chain::{Source, measure};
+use goniofit::control::Control;
+use goniofit::fit::{Field, FitOptions, Limit, ParameterName, fit};
+use goniofit::gonio::{Instrument, Scan};
+use goniofit::measurement::Measurement;
+use goniofit::numeric::random::{Purpose, RngExt, Stream, stream};
+
+/// Tables of each kind.
+const TABLES: u64 = 200;
+const TARGETS: [f64; 4] = [0.0001, 0.001, 0.01, 0.1];
+const BUDGETS_MS: [u64; 3] = [10, 50, 200];
+const CHANNELS: [&str; 3] = ["r", "g", "b"];
+/// Least share of the tables on which the bound must hold: 95 % less 1.3 standard deviations of the binomial over 200.
+const LEAST: f64 = 0.93;
+
+fn main() {
+    // `cargo bench` passes --bench, `cargo test --benches` nothing of the kind.
+    let quick = std::env::args().any(|a| a == "--quick");
+    let (tables, least) = if quick { (TABLES / 10, 0.8) } else { (TABLES, LEAST) };
+    let clock = Instant::now();
+    println!(
+        "| truth | asked for | directions used | rmse excess | stated | its 95 % bound | holds | time | of the full fit's |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let mut fine = true;
+    for kind in [Truth::Model, Truth::SecondLobe] {
+        let mut cells = cells();
+        let mut full = Vec::new();
+        for index in 0..tables {
+            let table = kind.table(index);
+            let whole = record(&table, &plain());
+            full.push(whole.seconds);
+            cells.iter_mut().for_each(|cell| cell.try_on(&table, &whole));
+        }
+        let full = median(&mut full);
+        for cell in &mut cells {
+            fine &= cell.held() >= least;
+            println!("{}", cell.row(kind, full));
+        }
+        println!("| {} | everything | 909,696 | | | | | {:.1} ms | 1 |", kind.name(), 1e3 * full);
+    }
+    println!(
+        "\n{tables} tables of each kind; medians. {:.0} s on {} threads.",
+        clock.elapsed().as_secs_f64(),
+        rayon::current_num_threads()
+    );
+    if !fine {
+        eprintln!("a bound holds too seldom");
+        std::process::exit(1);
+    }
+}
+
+/// What a table is made of.
+#[derive(Debug, Clone, Copy)]
+enum Truth {
+    /// Lambert and one Phong lobe, with noise.
+    Model,
+    /// A second Phong lobe besides, which the fit's model lacks.
+    SecondLobe,
+}
+
+impl Truth {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Model => "the model",
+            Self::SecondLobe => "a lobe more",
+        }
+    }
+
+    /// A whole MERL table of a random material; files of that format state no σ.
+    fn table(self, index: u64) -> Measurement {
+        let mut rng = stream(self as u64, Purpose::Study, index);
+        let mut lobes = vec![(LobeKind::Lambert, weights(&mut rng), vec![]), glossy(&mut rng)];
+        if matches!(self, Self::SecondLobe) {
+            lobes.push(glossy(&mut rng));
+        }
+        let material = Material::new(CHANNELS.map(str::to_owned).to_vec(), lobes);
+        let electrons = log_uniform(&mut rng, 1e3, 1e6);
+        let instrument = Instrument { electrons, ..Instrument::default() };
+        let source = Source::Fitted(Box::new(material));
+        let mut table = measure("made", &source, &instrument, &Scan::Merl, index, Control::silent()).expect("a table");
+        table.sigma = None;
+        table
+    }
+}
+
+fn log_uniform(rng: &mut Stream, low: f64, high: f64) -> f64 {
+    low * (high / low).powf(rng.random::<f64>())
+}
+
+fn weights(rng: &mut Stream) -> Vec<f64> {
+    CHANNELS.iter().map(|_| log_uniform(rng, 0.02, 0.45)).collect()
+}
+
+fn glossy(rng: &mut Stream) -> (LobeKind, Vec<f64>, Vec<f64>) {
+    (LobeKind::Phong, weights(rng), vec![log_uniform(rng, 2.0, 5000.0)])
+}
+
+fn plain() -> FitOptions {
+    FitOptions::new("lambert+phong".parse().expect("a model"))
+}
+
+fn fitted(table: &Measurement, options: &FitOptions) -> Material {
+    fit(table, options).expect("a fit").material
+}
+
+fn record(table: &Measurement, options: &FitOptions) -> FitRecord {
+    fitted(table, options).fit.expect("a record")
+}
+
+/// One setting of the knob, and how it went on every table.
+struct Cell {
+    name: String,
+    options: FitOptions,
+    runs: Vec<Run>,
+}
+
+/// A fit to a part of a table.
+struct Run {
+    used: f64,
+    /// By how much its rmse over all samples exceeds the full fit's, as a share.
+    excess: f64,
+    stated: f64,
+    bound: f64,
+    seconds: f64,
+}
+
+fn cells() -> Vec<Cell> {
+    let target = |share: f64| {
+        let options = FitOptions { target_rmse_excess: Some(share), ..plain() };
+        Cell { name: format!("excess ≤ {} %", 100.0 * share), options, runs: Vec::new() }
+    };
+    let budget = |ms: u64| {
+        let options = FitOptions { time_budget: Some(Duration::from_millis(ms)), ..plain() };
+        Cell { name: format!("{ms} ms"), options, runs: Vec::new() }
+    };
+    TARGETS.map(target).into_iter().chain(BUDGETS_MS.map(budget)).collect()
+}
+
+impl Cell {
+    fn try_on(&mut self, table: &Measurement, whole: &FitRecord) {
+        let got = fitted(table, &self.options);
+        let own = got.fit.as_ref().expect("a record");
+        let run = match &own.subset {
+            Some(part) => Run {
+                used: part.samples as f64,
+                excess: record(table, &held(&got)).rmse / whole.rmse - 1.0,
+                stated: part.rmse_excess,
+                bound: part.rmse_excess_95,
+                seconds: own.seconds,
+            },
+            None => Run { used: own.samples as f64, excess: 0.0, stated: 0.0, bound: 0.0, seconds: own.seconds },
+        };
+        self.runs.push(run);
+    }
+
+    /// Share of the tables on which the bound holds, but for rounding.
+    fn held(&self) -> f64 {
+        let holds = |run: &&Run| run.excess <= run.bound + 1e-10;
+        self.runs.iter().filter(holds).count() as f64 / self.runs.len() as f64
+    }
+
+    fn row(&self, kind: Truth, full: f64) -> String {
+        let of = |value: fn(&Run) -> f64| median(&mut self.runs.iter().map(value).collect::<Vec<f64>>());
+        let percent = |value: fn(&Run) -> f64| format!("{:.3} %", 100.0 * of(value));
+        let seconds = of(|r| r.seconds);
+        format!(
+            "| {} | {} | {:.0} | {} | {} | {} | {:.1} % | {:.1} ms | {:.2} |",
+            kind.name(),
+            self.name,
+            of(|r| r.used),
+            percent(|r| r.excess),
+            percent(|r| r.stated),
+            percent(|r| r.bound),
+            100.0 * self.held(),
+            1e3 * seconds,
+            seconds / full
+        )
+    }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// The fit that holds every parameter where `at` has it: its rmse is the one over all samples.
+fn held(at: &Material) -> FitOptions {
+    let mut limits = Vec::new();
+    for lobe in &at.lobes {
+        let mut hold = |field, value| {
+            let parameter = ParameterName { kind: lobe.kind, occurrence: 0, field };
+            limits.push(Limit { parameter, low: value, high: value });
+        };
+        for (channel, weight) in CHANNELS.iter().zip(&lobe.weight) {
+            hold(Field::Weight(Some((*channel).to_owned())), *weight);
+        }
+        for (known, value) in lobe.kind.lobe().parameters().iter().zip(lobe.shape_of(0).unwrap_or_default()) {
+            hold(Field::Shape(known.name.to_owned()), value);
+        }
+    }
+    FitOptions { limits, ..plain() }
+}
