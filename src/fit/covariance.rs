@@ -138,7 +138,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
             }
         }
     }
-    let sandwich = Sandwich::new(&normal, &pinned);
+    let sandwich = Sandwich::new(&normal, &pinned, &limited(problem, at));
     let covariance = sandwich.covariance(&spread, &common);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
@@ -161,6 +161,15 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     }
 }
 
+/// The weights of each channel that its energy limit ties together: they can move, but not their sum.
+fn limited(problem: &Problem<'_>, at: &Solution) -> Vec<Vec<usize>> {
+    let of = |(c, x): (usize, &DVector<f64>)| {
+        let (free, capped) = problem.feasible(c).free_at(x);
+        capped.then(|| free.iter().map(|l| c * x.len() + l).collect())
+    };
+    at.weights.iter().enumerate().filter_map(of).collect()
+}
+
 /// Which parameters are held at a value.
 fn pinned(problem: &Problem<'_>, channels: usize) -> Vec<bool> {
     let ranges = problem.ranges[..channels].iter().flatten().chain(&problem.bounds);
@@ -175,17 +184,24 @@ struct Sandwich {
 }
 
 impl Sandwich {
-    /// Of the parameters that are not pinned.
-    fn new(normal: &DMatrix<f64>, pinned: &[bool]) -> Self {
+    /// Of the parameters that are not pinned, those of each list in `sums` moving only so that their sum stays.
+    fn new(normal: &DMatrix<f64>, pinned: &[bool], sums: &[Vec<usize>]) -> Self {
         let root = |i: usize| if normal[(i, i)] > 0.0 && !pinned[i] { 1.0 / normal[(i, i)].sqrt() } else { 0.0 };
         let scale = DVector::from_fn(pinned.len(), |i, _| root(i));
         let n = scale.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
-        let eigen = scaled.symmetric_eigen();
+        let tied: Vec<DVector<f64>> = sums
+            .iter()
+            .map(|sum| DVector::from_fn(n, |i, _| if sum.contains(&i) { scale[i] } else { 0.0 }))
+            .filter_map(|v| v.try_normalize(0.0))
+            .collect();
+        let mut within = DMatrix::identity(n, n);
+        tied.iter().for_each(|q| within.ger(-1.0, q, q, 1.0));
+        let eigen = (&within * scaled * &within).symmetric_eigen();
         let floor = UNDETERMINED * eigen.eigenvalues.max();
         let inverse = eigen.eigenvalues.map(|l| if l > floor { 1.0 / l } else { 0.0 });
-        let v = &eigen.eigenvectors;
-        let pseudo = v * DMatrix::from_diagonal(&inverse) * v.transpose();
+        let v = &within * &eigen.eigenvectors;
+        let pseudo = &v * DMatrix::from_diagonal(&inverse) * v.transpose();
         let open = |i: usize| {
             let share: f64 = (0..n).filter(|&k| inverse[k] == 0.0).map(|k| v[(i, k)].powi(2)).sum();
             if scale[i] > 0.0 { share } else { 1.0 }
@@ -378,7 +394,7 @@ impl ChannelSums {
     fn stated(&mut self, block: &Block, w: &[f64], data_slopes: &[f64], sigma: &[f64]) -> Vec<Option<f64>> {
         let of = |i: usize| {
             let s = data_slopes[i] * sigma[block.index[i] as usize];
-            (s.is_finite() && w[i] > 0.0).then_some(s)
+            (s.is_finite() && s > 0.0 && w[i] > 0.0).then_some(s)
         };
         let known: Vec<Option<f64>> = (0..block.len()).map(of).collect();
         for (s, w) in known.iter().zip(w) {

@@ -19,6 +19,7 @@ mod joint;
 mod limits;
 mod loss;
 mod merl_lines;
+mod offset;
 mod options;
 mod part;
 mod passes;

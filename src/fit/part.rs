@@ -8,6 +8,7 @@ use super::identify;
 use super::intervals::{self, Intervals};
 use super::joint::{self, Digits};
 use super::limits::Ranges;
+use super::offset;
 use super::options::{FitError, FitOptions};
 use super::passes::{self, Saturation};
 use super::quadratic;
@@ -41,6 +42,12 @@ pub(super) struct Part {
     pub intervals: Intervals,
     pub saturation: Saturation,
     pub structure: Option<Structure>,
+    /// Whether noise could not be told from model error although there are residuals.
+    pub unjudged: bool,
+    /// How clearly the fit is off the data's mean, in standard deviations, where it is.
+    pub offset: Option<f64>,
+    /// Whether the energy limit decides a channel's weights, channel by channel.
+    pub capped: Vec<bool>,
     pub stop: Stop,
     pub history: Vec<Iteration>,
     pub report: SearchReport,
@@ -232,7 +239,13 @@ fn finish(
     let residuals = samples.residuals();
     let rmse = (solution.cost / residuals.max(1) as f64).sqrt();
     let (sum, known) = uncertainty.stated;
-    let stated = (known == residuals && known > 0).then(|| (sum / residuals as f64).sqrt());
+    // Of outliers a stated σ says nothing: a robust fit's noise is told by neighbours.
+    let says = known == residuals && known > 0 && problem.saturation.is_none();
+    let stated = says.then(|| (sum / residuals as f64).sqrt());
+    let independent = residuals as f64 / uncertainty.design_effect;
+    let structure = structure::structure(rmse, stated, &uncertainty.neighbours, residuals, independent);
+    let structure = structure.filter(|_| rmse > ROUNDING);
+    let capped = (0..solution.weights.len()).map(|c| problem.feasible(c).free_at(&solution.weights[c]).1).collect();
     let weights = solution.weights.len() * problem.kinds.len();
     let at_end: Vec<bool> = (weights..uncertainty.errors.len())
         .map(|i| intervals::is_at_end(problem, &solution, &uncertainty, i))
@@ -249,14 +262,10 @@ fn finish(
         epsilon: samples.epsilon.clone(),
         layout: problem.layout.clone(),
         bounds: problem.bounds.clone(),
-        structure: structure::structure(
-            rmse,
-            stated,
-            &uncertainty.neighbours,
-            residuals,
-            residuals as f64 / uncertainty.design_effect,
-        )
-        .filter(|_| rmse > ROUNDING),
+        unjudged: rmse > ROUNDING && structure.is_none() && residuals > uncertainty.errors.len(),
+        structure,
+        offset: offset::offset(problem, &solution),
+        capped,
         saturation: problem.saturation,
         stop: found.outcome.stop,
         history: found.outcome.history,

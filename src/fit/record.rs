@@ -302,7 +302,62 @@ impl Facts<'_> {
             ));
         }
         list.extend(Self::structure_warning(record));
+        list.extend(self.noise_warnings(record));
+        let capped: Vec<&str> = self.capped().map(|c| self.measurement.channels[c].as_str()).collect();
+        if !capped.is_empty() {
+            let plural = if capped.len() > 1 { "s" } else { "" };
+            list.push(format!(
+                "the energy limit decides: the weights of channel{plural} {} add up to 1, the most they may",
+                capped.join(", ")
+            ));
+        }
         list.extend(record.energy.as_ref().and_then(|e| energy::warning(material, e)));
+        list
+    }
+
+    /// Channels whose weights the energy limit decides.
+    fn capped(&self) -> impl Iterator<Item = usize> {
+        (0..self.measurement.channels.len()).filter(|&c| {
+            let (part, own) = self.of_channel(c);
+            part.capped[own]
+        })
+    }
+
+    /// What the noise does to the fit, or what can't be said of it.
+    fn noise_warnings(&self, record: &FitRecord) -> Vec<String> {
+        let mut list = Vec::new();
+        let structured = record.residual.as_ref().is_some_and(|r| r.structured_share > STRUCTURED);
+        // Of other losses the stated noise is a guess where it is not small beside the value.
+        let linear = matches!(self.options.loss, super::loss::Loss::L2 | super::loss::Loss::CosineL2);
+        let off = self.parts.iter().filter_map(|p| p.offset).fold(0.0, f64::max);
+        if off > 0.0 && !structured {
+            let cause = if self.parts[0].weighting == "sigma" {
+                "weights that follow the noise pull"
+            } else {
+                "this loss pulls"
+            };
+            list.push(format!(
+                "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away, and \
+                 neither standard errors nor intervals cover that; `--loss cosine-l2` without `--use-sigma` follows the mean"
+            ));
+        }
+        if let Some(residual) = record
+            .residual
+            .as_ref()
+            .filter(|r| linear && r.noise_from == "sigma" && record.rmse < OVERSTATED * r.noise_rmse)
+        {
+            list.push(format!(
+                "the residuals are {:.1} times smaller than the stated σ: it may be overstated, and the standard errors with it",
+                residual.noise_rmse / record.rmse
+            ));
+        }
+        if self.parts.iter().any(|p| p.unjudged) {
+            list.push(
+                "whether the residuals are noise or model error can't be told: among the samples that were used too few are \
+                 neighbours, and no σ is stated for all of them"
+                    .into(),
+            );
+        }
         list
     }
 
@@ -318,6 +373,9 @@ impl Facts<'_> {
         ))
     }
 }
+
+/// Residuals below this share of the stated σ are worth a word.
+const OVERSTATED: f64 = 0.7;
 
 /// A shape parameter of one part, in natural units.
 #[derive(Default)]

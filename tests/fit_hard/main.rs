@@ -13,4 +13,5 @@ mod optimum;
 mod properties;
 mod recovery;
 mod reference;
+mod said;
 mod support;
