@@ -39,9 +39,15 @@ impl Thin {
     /// All of them.
     pub const NONE: Self = Self { step: 1, run: 1 };
 
-    fn keeps(self, entry: usize) -> bool {
-        let run = entry / self.run;
-        self.step == 1 || run % self.step == offset(run / self.step, self.step)
+    /// Those of a range that are looked at.
+    fn entries(self, range: Range<usize>) -> impl Iterator<Item = usize> {
+        let run = if self.step == 1 { range.end.max(1) } else { self.run };
+        let group = self.step * run;
+        let of_group = move |g: usize| {
+            let first = g * group + offset(g, self.step) * run;
+            first.max(range.start)..(first + run).min(range.end)
+        };
+        (range.start / group..range.end.div_ceil(group)).flat_map(of_group)
     }
 }
 
@@ -93,8 +99,8 @@ impl Judge<'_> {
         let (mut block, mut left) = (Block::default(), Left::default());
         block.reset(channels, channels);
         let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
-        let counts = |e: &usize| e.is_multiple_of(self.options.stride) && self.thin.keeps(*e);
-        for entry in range.filter(counts) {
+        let counts = |e: &usize| e.is_multiple_of(self.options.stride);
+        for entry in self.thin.entries(range).filter(counts) {
             left.entries += 1;
             let (wi, wo) = self.samples.measurement.directions.pair(entry);
             if !(wi.z > 0.0 && wo.z > 0.0) {
@@ -143,5 +149,23 @@ impl Judge<'_> {
         let sigma = self.samples.measurement.sigma_plane(channel).map_or(f64::NAN, |s| s[entry]);
         let sigma_r = sigma * self.samples.loss.data_slope(datum.value, datum);
         if sigma > 0.0 && sigma_r > 0.0 && sigma_r.is_finite() { sigma_r.powi(-2) } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinned_entries_are_one_run_of_each_group_wherever_a_range_is_cut() {
+        for thin in [Thin::NONE, Thin { step: 7, run: 1 }, Thin { step: 5, run: 12 }] {
+            let all: Vec<usize> = thin.entries(0..1000).collect();
+            let cut: Vec<usize> = [0..333, 333..334, 334..1000].into_iter().flat_map(|r| thin.entries(r)).collect();
+            assert_eq!(all, cut);
+            for group in all.chunk_by(|a, b| a / (thin.step * thin.run) == b / (thin.step * thin.run)) {
+                assert!(group.len() <= thin.run && group.windows(2).all(|p| p[1] == p[0] + 1), "{group:?}");
+            }
+            assert!(all.len() >= 1000 / (thin.step * thin.run) * thin.run);
+        }
     }
 }
