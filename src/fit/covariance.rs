@@ -138,7 +138,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
             }
         }
     }
-    let sandwich = Sandwich::new(&normal, &pinned, &limited(problem, at));
+    let sandwich = Sandwich::new(&normal, &pinned, &limited(problem, at, &pinned));
     let covariance = sandwich.covariance(&spread, &common);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
@@ -161,11 +161,12 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     }
 }
 
-/// The weights of each channel that its energy limit ties together: they can move, but not their sum.
-fn limited(problem: &Problem<'_>, at: &Solution) -> Vec<Vec<usize>> {
+/// The weights of each channel that its energy limit ties together: they can move, but not their sum. A weight alone has nothing to be tied
+/// to: it stands at the end of its range, and keeps its error as one at 0 does.
+fn limited(problem: &Problem<'_>, at: &Solution, pinned: &[bool]) -> Vec<Vec<usize>> {
     let of = |(c, x): (usize, &DVector<f64>)| {
-        let (free, capped) = problem.feasible(c).free_at(x);
-        capped.then(|| free.iter().map(|l| c * x.len() + l).collect())
+        let own: Vec<usize> = (c * x.len()..(c + 1) * x.len()).filter(|&i| !pinned[i]).collect();
+        (problem.feasible(c).free_at(x).1 && own.len() > 1).then_some(own)
     };
     at.weights.iter().enumerate().filter_map(of).collect()
 }

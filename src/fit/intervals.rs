@@ -51,7 +51,8 @@ pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncerta
         let (value, (low, high)) = parameter(problem, at, i);
         let reach = uncertainty.quantile * error;
         let at_end = is_at_end(problem, at, uncertainty, i);
-        let near_end = i < weights && (value - low < 1.5 * reach || high - value < 1.5 * reach);
+        let near_end =
+            i < weights && (value - low < 1.5 * reach || high - value < 1.5 * reach || is_capped(problem, at, i));
         let lopsided = near_end && !problem.layout.is_empty() || i >= weights && reach > NARROW;
         if low == high || !(lopsided || at_end) {
             continue;
@@ -67,13 +68,21 @@ pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncerta
     intervals
 }
 
-/// Value and range of parameter `i`.
+/// Whether the energy limit decides the channel that weight `i` belongs to.
+fn is_capped(problem: &Problem<'_>, at: &Solution, i: usize) -> bool {
+    let c = i / problem.kinds.len();
+    problem.feasible(c).free_at(&at.weights[c]).1
+}
+
+/// Value and range of parameter `i`; a weight's reaches no farther than its channel's energy limit and the others' least leave it.
 fn parameter(problem: &Problem<'_>, at: &Solution, i: usize) -> (f64, (f64, f64)) {
     let lobes = problem.kinds.len();
     let weights = at.weights.len() * lobes;
     if i < weights {
         let (c, l) = (i / lobes, i % lobes);
-        return (at.weights[c][l], problem.ranges[c][l]);
+        let (low, high) = problem.ranges[c][l];
+        let others: f64 = problem.ranges[c].iter().map(|r| r.0).sum::<f64>() - low;
+        return (at.weights[c][l], (low, high.min(problem.cap.map_or(f64::INFINITY, |cap| cap - others))));
     }
     (at.t[i - weights], problem.bounds[i - weights])
 }

@@ -27,7 +27,7 @@ pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<f64> {
             scratch.model(x);
             let (w, y) = (block.weight(c), &block.y[c]);
             for i in (0..block.len()).filter(|&i| w[i] > 0.0) {
-                let neighbour = w[if i > 0 { i - 1 } else { (i + 1).min(w.len() - 1) }];
+                let Some(neighbour) = neighbour(block, i).map(|k| w[k]) else { continue };
                 let residual = neighbour * block.cos_i[i] * block.cos_i[i] * (scratch.f[i] - y[i]);
                 for (l, (sum, square)) in sums[c * lobes..(c + 1) * lobes].iter_mut().enumerate() {
                     let term = residual * scratch.columns[l][i];
@@ -48,4 +48,12 @@ pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<f64> {
     let score = |(sum, square): (f64, f64)| if square > 0.0 { f64::abs(sum) / f64::sqrt(square) } else { 0.0 };
     let most = (0..zero.len()).filter(free).map(|k| score(total(k))).fold(0.0, f64::max);
     (most > CLEARLY_OFF).then_some(most)
+}
+
+/// A sample beside sample `i` of a block.
+fn neighbour(block: &Block, i: usize) -> Option<usize> {
+    if block.pairs[i] > 0.0 && i > 0 {
+        return Some(i - 1);
+    }
+    block.pairs.get(i + 1).filter(|pair| **pair > 0.0).map(|_| i + 1)
 }

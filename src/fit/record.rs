@@ -336,8 +336,10 @@ impl Facts<'_> {
             } else {
                 "this loss pulls"
             };
+            let misfit = record.residual.as_ref().is_some_and(|r| r.model_rmse > 0.0);
+            let or = if misfit { " (or the model's own error, weighed differently, does)" } else { "" };
             list.push(format!(
-                "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away, and \
+                "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away{or}, and \
                  neither standard errors nor intervals cover that; `--loss cosine-l2` without `--use-sigma` follows the mean"
             ));
         }

@@ -64,6 +64,16 @@ fn weights_that_the_energy_limit_ties_have_equal_errors() {
     assert!(error(0) > 0.0 && rel(error(0), error(1)) < 1e-9, "{} {}", error(0), error(1));
     let matrix = &record.correlation.as_ref().expect("few parameters").matrix;
     assert!((matrix[0][1].expect("known") + 1.0).abs() < 1e-9, "{matrix:?}");
+    let interval = |l: usize| record.interval_95[l].weight[0].expect("determined");
+    let ((a, b), (c, d)) = (interval(0), interval(1));
+    // What one loses the other may gain at most; neither reaches beyond the limit.
+    assert!(b <= 1.0 && d <= 1.0 && c <= 1.0 - b + 1e-6 && d <= 1.0 - a + 1e-6, "{a} {b} {c} {d}");
+    assert!(a < got.lobes[0].weight[0] && got.lobes[0].weight[0] <= b, "{a} {b}");
+    // A weight alone at the limit has room below only.
+    let one = solved(&m, &FitOptions { conserve_energy: true, ..options("lambert") });
+    let fit = crate::support::record(&one);
+    let (low, high) = fit.interval_95[0].weight[0].expect("determined");
+    assert!(one.lobes[0].weight[0] == 1.0 && high == 1.0 && low < 1.0, "{one:?}");
     assert!(!says(&solved(&m, &options("lambert+phong")), "the energy limit decides"));
 }
 
