@@ -1,12 +1,12 @@
 //! `goniofit convert`: between measurement formats; a fit is sampled onto the format's grid.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::{check_folder, output_format, stdout_is_free, write_measurement};
+use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, write_measurement};
 use super::simulate::parse_scan;
 use super::ui::Ui;
 use crate::chain::{self, Source};
@@ -62,6 +62,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             let flat = material.is_flat();
             let scan = match &args.scan {
                 Some(text) => match parse_scan(text)? {
+    keeps_inputs("OUT", &args.out, [Path::new(&args.input)])?;
                     Scan::Merl => merl_grid(options.merl_angles),
                     other => other,
                 },

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::{check_folder, write_text};
+use super::output::{check_folder, keeps_inputs, make_folder, write_text};
 use super::ui::{self, Ui};
 use crate::brdf::{FitRecord, Material, ModelChoice, ModelSpec, PerChannel, SpecError};
 use crate::fit::{Bootstrap, FitError, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
@@ -158,15 +158,15 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         check_folder(out)?;
     }
     if let Some(folder) = &args.out_dir {
-        std::fs::create_dir_all(folder).map_err(|e| Failure::output(folder, &e))?;
+        make_folder("--out-dir", folder)?;
     }
-    let options = args.options()?;
     let reading = args.reading.options();
     let (mut text, mut results, mut failures) = (String::new(), Vec::new(), Vec::new());
     // The next file is read while this one is fitted.
     let done = std::thread::scope(|scope| {
         let (scope, reading) = (scope, &reading);
         let read = |file: &PathBuf| {
+    let options = args.options()?;
             let file = file.clone();
             scope.spawn(move || formats::read(&file, reading))
         };
@@ -216,7 +216,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Where each fit goes; two files of one name are refused before anything is written.
+/// Where each fit goes, checked before anything is read: no fit goes where a measurement or another fit is.
 fn targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
     if args.out.is_some() && args.files.len() > 1 {
         return Err(Failure::usage("--out takes one measurement; use --out-dir for several"));
@@ -231,6 +231,16 @@ fn targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
         let target = folder.join(format!("{stem}.json"));
         if targets.contains(&target) {
             return Err(Failure::usage(format!("two measurements would be written to {}", target.display())));
+    let targets = named_targets(args)?;
+    let option = if args.out_dir.is_some() { "--out-dir" } else { "--out" };
+    for target in targets.iter().flatten() {
+        keeps_inputs(option, target, args.files.iter().map(PathBuf::as_path))?;
+    }
+    Ok(targets)
+}
+
+/// Where each fit goes by its name; two of one name are refused.
+fn named_targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
         }
         targets.push(target);
     }
