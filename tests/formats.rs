@@ -314,7 +314,7 @@ fn written(table: &Measurement, format: Format) -> (Vec<u8>, WriteReport) {
 }
 
 fn read_bytes(bytes: Vec<u8>, merl_angles: MerlAngles) -> Measurement {
-    let options = ReadOptions { merl_angles, ..ReadOptions::default() };
+    let options = ReadOptions { merl_angles: Some(merl_angles), ..ReadOptions::default() };
     formats::read_bytes(Path::new("t.any"), bytes, &options).expect("readable")
 }
 
