@@ -38,14 +38,15 @@ pub(super) struct Args {
     /// What is minimised; docs/fit.md has the formulas
     #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2|log|cuberoot|relative", help_heading = MODEL)]
     loss: Loss,
-    /// Let outliers count less; SCALE times the residuals' σ is where they begin [default SCALE: huber 1.345, cauchy 2.385]
+    /// Let outliers count less; SCALE (1e-3 to 1e6) times the residuals' σ is where they begin [default SCALE: huber 1.345,
+    /// cauchy 2.385]
     #[arg(long, value_name = "huber|cauchy[:SCALE]", help_heading = MODEL)]
     robust: Option<Robust>,
     /// How samples count
     #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform", help_heading = SAMPLES)]
     weights: WeightMode,
     /// Weigh by the σ that the file states, instead of the solid angle
-    #[arg(long, help_heading = SAMPLES)]
+    #[arg(long, conflicts_with = "weights", help_heading = SAMPLES)]
     use_sigma: bool,
     /// Leave out samples with θi or θo above this, degrees
     #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true, help_heading = SAMPLES)]
@@ -56,10 +57,10 @@ pub(super) struct Args {
     /// Let every channel have its own shapes
     #[arg(long, help_heading = MODEL)]
     per_channel: bool,
-    /// Hold a parameter at a value, phong.exponent=50 say; a second lobe of a kind is phong[1]; may be repeated
+    /// Hold a parameter at a value, phong.exponent=50 say; a second lobe of a kind is phong[1]; may be repeated for others
     #[arg(long, value_name = "NAME=VALUE", value_parser = Limit::fixed, help_heading = MODEL)]
     fix: Vec<Limit>,
-    /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated
+    /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated for others
     #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range, help_heading = MODEL)]
     bound: Vec<Limit>,
     /// Fit under the constraint that no channel reflects more light than it receives
@@ -134,6 +135,13 @@ impl Args {
             Wanted::Model(model) => model.clone(),
             Wanted::Auto => "lambert".parse().map_err(|e: SpecError| Failure::work(e.to_string()))?,
         };
+        let limits: Vec<Limit> = self.fix.iter().chain(&self.bound).cloned().collect();
+        if let Some((first, second)) = Limit::doubled(&limits) {
+            let [first, second] = [first, second].map(|i| format!("{} {}", self.typed_by(i), limits[i]));
+            return Err(Failure::usage(format!(
+                "{first} and {second} limit the same parameter; expected one limit a parameter"
+            )));
+        }
         Ok(FitOptions {
             loss: self.loss,
             robust: self.robust,
@@ -142,13 +150,18 @@ impl Args {
             max_angle_deg: self.max_angle,
             stride: self.stride,
             per_channel: self.per_channel,
-            limits: self.fix.iter().chain(&self.bound).cloned().collect(),
+            limits,
             conserve_energy: self.conserve_energy,
             time_budget: self.time_budget,
             target_rmse_excess: self.target_rmse_excess,
             bootstrap: self.bootstrap.map(|replicates| Bootstrap { replicates, seed: self.seed }),
             ..FitOptions::new(model)
         })
+    }
+
+    /// The option that limit `i` of all was typed with.
+    fn typed_by(&self, i: usize) -> &'static str {
+        if i < self.fix.len() { "--fix" } else { "--bound" }
     }
 }
 
@@ -262,7 +275,7 @@ fn one(
         Wanted::Auto => fit_best_model(table, options),
         Wanted::Model(_) => fit(table, options),
     };
-    let fitted = fitted.map_err(|error| refused(args, error))?;
+    let fitted = fitted.map_err(|error| refused(args, file, error))?;
     if args.log {
         log(&fitted, ui);
     }
@@ -282,12 +295,16 @@ fn one(
 /// Why there is no fit, with the options named as they were typed.
 fn refused(args: &Args, error: FitError) -> Failure {
     let held = |name: &str| args.fix.iter().any(|limit| limit.parameter.to_string() == name);
+    let several = args.files.len() > 1;
+    let own = format!("{}: ", file.display());
     let (before, after) = match &error {
-        FitError::Limit { name, .. } if held(name) => ("--fix ", ""),
-        FitError::Limit { .. } => ("--bound ", ""),
-        FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)"),
-        FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)"),
-        _ => ("", ""),
+        FitError::Limit { name, .. } if held(name) => ("--fix ", String::new()),
+        FitError::Limit { .. } => ("--bound ", String::new()),
+        FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)".to_owned()),
+        FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)".to_owned()),
+        FitError::Solver { .. } => (&own[..], String::new()),
+        FitError::Option { .. } if several => ("", format!(" ({})", file.display())),
+        _ => ("", String::new()),
     };
     let failure = Failure::from(error);
     Failure { message: format!("{before}{}{after}", failure.message), ..failure }
