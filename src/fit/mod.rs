@@ -18,6 +18,7 @@ mod joint;
 mod limits;
 mod loss;
 mod merl_lines;
+mod missing;
 mod options;
 mod part;
 mod passes;
