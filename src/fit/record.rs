@@ -34,12 +34,18 @@ struct Row {
     at_end: Shapes<Option<Ended>>,
 }
 
+/// An end of a range.
+#[derive(Debug, Clone, Copy)]
+enum End {
+    Low,
+    High,
+}
+
 /// A shape that ended at an end of its range.
 #[derive(Debug, Clone, Copy)]
 struct Ended {
     value: f64,
-    /// At the high end, else at the low one.
-    high: bool,
+    end: End,
     /// Whether that end was asked for, else it is the end of what is searched.
     asked: bool,
     /// Whether the data determine it all the same.
@@ -51,7 +57,10 @@ struct Ended {
 impl Ended {
     /// What is told of the parameter called `name`.
     fn warning(self, name: &str) -> String {
-        let (end, more) = if self.high { ("high", "a larger one") } else { ("low", "a smaller one") };
+        let (end, more) = match self.end {
+            End::High => ("high", "a larger one"),
+            End::Low => ("low", "a smaller one"),
+        };
         let range = if self.asked { "was asked for" } else { "is searched" };
         let place = format!("{name} ended at {}, the {end} end of the range that {range}", brief(self.value));
         let wish = format!("{place}: the data ask for {more}, so there is no standard error");
@@ -404,9 +413,9 @@ impl Part {
         if !(low < high && self.lit(l) && (t <= low || t >= high)) {
             return None;
         }
-        let high = t >= high;
-        let (value, end) = if high { (range.1, searched.1) } else { (range.0, searched.0) };
-        Some(Ended { value, high, asked: value != end, determined: self.at_end[i], interval: false })
+        let (end, value, last) =
+            if t >= high { (End::High, range.1, searched.1) } else { (End::Low, range.0, searched.0) };
+        Some(Ended { value, end, asked: value != last, determined: self.at_end[i], interval: false })
     }
 }
 
