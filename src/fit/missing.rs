@@ -8,9 +8,10 @@ use crate::numeric::sum::map_blocks;
 /// Slack in the cosine that makes the angular limit inclusive whatever the rounding of the direction.
 const INCLUSIVE: f64 = 1e-12;
 
-/// What is to be told of values that are missing.
-pub(super) fn warnings(measurement: &Measurement, options: &FitOptions) -> Vec<String> {
-    let (missing, all) = if measurement.masked.total() > 0 { count(measurement, options) } else { (0, 0) };
+/// What is to be told of values that are missing. `valid` is how many there are within the angular limit, where a fit to all of a grid has
+/// counted them.
+pub(super) fn warnings(measurement: &Measurement, options: &FitOptions, valid: Option<usize>) -> Vec<String> {
+    let (missing, all) = if measurement.masked.total() > 0 { count(measurement, options, valid) } else { (0, 0) };
     let left_out = format!("{missing} of {all} values are missing (NaN or masked in the file) and were left out");
     let dark = (0..measurement.channels.len()).filter(|c| is_dark(measurement.plane(*c)));
     let dark = dark.map(|c| format!("channel {} has no positive value", measurement.channels[c]));
@@ -23,20 +24,25 @@ fn is_dark(plane: &[f64]) -> bool {
 }
 
 /// Values missing, and values in all, of the entries within the angular limit that the stride takes.
-fn count(measurement: &Measurement, options: &FitOptions) -> (usize, usize) {
+fn count(measurement: &Measurement, options: &FitOptions, valid: Option<usize>) -> (usize, usize) {
     let least_cos = options.max_angle_deg.to_radians().cos() - INCLUSIVE;
     let blocks = match measurement.directions {
-        Directions::Merl(grid) if options.stride == 1 => of_grid(measurement, grid, least_cos),
+        Directions::Merl(grid) if options.stride == 1 => of_grid(measurement, grid, least_cos, valid),
         _ => of_list(measurement, options.stride, least_cos),
     };
     blocks.iter().fold((0, 0), |sum, block| (sum.0 + block.0, sum.1 + block.1))
 }
 
-fn of_grid(measurement: &Measurement, grid: MerlGrid, least_cos: f64) -> Vec<(usize, usize)> {
+fn of_grid(measurement: &Measurement, grid: MerlGrid, least_cos: f64, valid: Option<usize>) -> Vec<(usize, usize)> {
     let lines = MerlLines::new(grid, least_cos, false);
+    let channels = measurement.channels.len();
+    if let Some(valid) = valid {
+        let entries = (0..MerlLines::blocks()).flat_map(|b| lines.lines(b)).map(|line| line.entries().len());
+        let all = entries.sum::<usize>() * channels;
+        return vec![(all.saturating_sub(valid), all)];
+    }
     let of_entries = |(missing, all), entries: std::ops::Range<usize>| {
         let gone = |c: usize| measurement.plane(c)[entries.clone()].iter().filter(|v| v.is_nan()).count();
-        let channels = measurement.channels.len();
         (missing + (0..channels).map(gone).sum::<usize>(), all + entries.len() * channels)
     };
     let of_blocks = |blocks: std::ops::Range<usize>| {
@@ -81,9 +87,9 @@ mod tests {
         let values = vec![nan, 0.1, nan, nan, 0.0, nan, -0.1, 0.0];
         let mut table = Measurement::new("t", list, vec!["r".into(), "g".into()], values);
         table.masked = Masked { marked: 4, ..Masked::default() };
-        assert_eq!(count(&table, &options(1)), (3, 6));
-        assert_eq!(count(&table, &options(2)), (2, 4));
-        let said = warnings(&table, &options(1));
+        assert_eq!(count(&table, &options(1), None), (3, 6));
+        assert_eq!(count(&table, &options(2), None), (2, 4));
+        let said = warnings(&table, &options(1), None);
         assert!(said.len() == 2 && said[0].starts_with("3 of 6 values are missing"), "{said:?}");
         assert_eq!(said[1], "channel g has no positive value");
     }
@@ -95,6 +101,8 @@ mod tests {
         let table = Measurement::new("t", Directions::Merl(grid), vec!["r".into()], values);
         let least_cos = 70f64.to_radians().cos() - INCLUSIVE;
         let sum = |blocks: Vec<(usize, usize)>| blocks.iter().fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-        assert_eq!(sum(of_grid(&table, grid, least_cos)), sum(of_list(&table, 1, least_cos)));
+        let want = sum(of_list(&table, 1, least_cos));
+        assert_eq!(sum(of_grid(&table, grid, least_cos, None)), want);
+        assert_eq!(sum(of_grid(&table, grid, least_cos, Some(want.1 - want.0))), want);
     }
 }

@@ -325,8 +325,10 @@ impl Facts<'_> {
                 list.push(format!("channel {channel} has no valid sample"));
             }
         }
-        list.extend(missing::warnings(self.measurement, self.options));
         let refused: usize = self.parts.iter().map(|p| p.refused).sum();
+        let whole = !self.options.use_sigma && self.parts.iter().all(|p| p.subset.is_none());
+        let valid = whole.then(|| self.parts.iter().flat_map(|p| &p.counts).sum::<usize>() + refused);
+        list.extend(missing::warnings(self.measurement, self.options, valid));
         if refused > 0 {
             list.push(format!("{refused} values are too negative for the logarithm of the loss and were left out"));
         }
