@@ -130,7 +130,7 @@ fn the_flat_world_is_read_as_one() {
     assert_eq!(table.masked.marked, 3);
     assert_eq!(table.notes, ["masked as at the horizon: 3 of the values, the first at line 3, column r"]);
     let both = b"# dimension: 2\ntheta_i_deg,theta_o_deg,r\n90,0,0.1\n0,90,0.1\n-90,0,0.1\n0,-90,0.1\n0,89.9,0.1\n";
-    let table = read_bytes(both.to_vec(), MerlAngles::Center);
+    let table = read_bytes(both.to_vec(), None);
     assert_eq!((0..5).map(|i| table.value(0, i)).collect::<Vec<_>>(), [None, None, None, None, Some(0.1)]);
 }
 
@@ -193,7 +193,7 @@ fn grids_bring_their_solid_angles() {
 fn fred_block(rows: impl IntoIterator<Item = (u32, u32)>) -> Measurement {
     let rows: Vec<String> = rows.into_iter().map(|(theta, phi)| format!("{theta} {phi} 0.1\n")).collect();
     let text = format!("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n{}", rows.concat());
-    read_bytes(text.into_bytes(), MerlAngles::Center)
+    read_bytes(text.into_bytes(), None)
 }
 
 #[test]
@@ -313,8 +313,8 @@ fn written(table: &Measurement, format: Format) -> (Vec<u8>, WriteReport) {
     (bytes, report)
 }
 
-fn read_bytes(bytes: Vec<u8>, merl_angles: MerlAngles) -> Measurement {
-    let options = ReadOptions { merl_angles, ..ReadOptions::default() };
+fn read_bytes(bytes: Vec<u8>, merl_angles: impl Into<Option<MerlAngles>>) -> Measurement {
+    let options = ReadOptions { merl_angles: merl_angles.into(), ..ReadOptions::default() };
     formats::read_bytes(Path::new("t.any"), bytes, &options).expect("readable")
 }
 
@@ -363,7 +363,7 @@ fn merl_to_csv_to_merl_loses_nothing() {
     let table = read_bytes(merl, MerlAngles::Edge);
     let (csv, report) = written(&table, Format::Csv);
     assert_eq!(report, WriteReport::default());
-    let back = read_bytes(csv, MerlAngles::Center);
+    let back = read_bytes(csv, None);
     assert_eq!(back.directions, table.directions);
     assert_eq!((back.weights, back.origin.as_str()), (Weights::Merl, "CSV"));
     assert!(same_bits(&back.values, &table.values));
@@ -383,7 +383,7 @@ fn csv_keeps_everything_of_every_fixture() {
         "grid-pole-for-every-azimuth.fred.txt",
     ] {
         let table = fixture(name);
-        let back = read_bytes(written(&table, Format::Csv).0, MerlAngles::Center);
+        let back = read_bytes(written(&table, Format::Csv).0, None);
         assert!(same_bits(&back.values, &table.values), "{name}");
         assert_eq!((back.dimension, &back.channels), (table.dimension, &table.channels), "{name}");
         assert_eq!(back.weights, table.weights, "{name}");
@@ -580,7 +580,7 @@ fn zemax_tristimulus_blocks_become_channels_and_full_azimuth_is_kept() {
         block("TristimulusY", 2.0),
         block("TristimulusZ", 3.0)
     );
-    let table = read_bytes(text.into_bytes(), MerlAngles::Center);
+    let table = read_bytes(text.into_bytes(), None);
     assert_eq!((table.channels.join(""), table.len()), ("xyz".to_string(), 8));
     assert_eq!(table.stated_scatter, [(20.0, 1.0)]);
     for (c, k) in [1.0, 2.0, 3.0].into_iter().enumerate() {

@@ -103,6 +103,9 @@ pub struct ModelChoice {
     pub reason: String,
     /// All that were compared, simplest first.
     pub candidates: Vec<ModelCandidate>,
+    /// Directions that they were compared on, where that was not all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<u64>,
 }
 
 /// A model among others.

@@ -1,12 +1,12 @@
 //! `goniofit convert`: between measurement formats; a fit is sampled onto the format's grid.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::{check_folder, output_format, stdout_is_free, write_measurement};
+use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, write_measurement};
 use super::simulate::parse_scan;
 use super::ui::Ui;
 use crate::chain::{self, Source};
@@ -46,9 +46,23 @@ fn merl_grid(angles: MerlAngles) -> Scan {
     }
 }
 
+/// The grid that a fit is sampled on.
+fn scan_of(args: &Args, format: Format, flat: bool, angles: Option<MerlAngles>) -> Result<Scan, Failure> {
+    let asked = args.scan.as_deref().map(parse_scan).transpose()?;
+    match asked {
+        Some(Scan::Merl) => Ok(merl_grid(angles.unwrap_or_default())),
+        None if format == Format::Merl => Ok(merl_grid(angles.unwrap_or_default())),
+        _ if angles.is_some() => Err(Failure::usage("--merl-angles: only a MERL grid has bins; use --scan merl")),
+        Some(other) => Ok(other),
+        None if flat => Ok(Scan::Flat { step_deg: 1.0 }),
+        None => Ok(Scan::Hemisphere { step_deg: 5.0 }),
+    }
+}
+
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let format = output_format(&args.out, args.to)?;
     check_folder(&args.out)?;
+    keeps_inputs("OUT", &args.out, [Path::new(&args.input)])?;
     stdout_is_free(&args.out, ui)?;
     let options = args.reading.options();
     let table = match chain::load(&args.input, &options)? {
@@ -59,16 +73,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             *table
         }
         Source::Fitted(material) => {
-            let flat = material.is_flat();
-            let scan = match &args.scan {
-                Some(text) => match parse_scan(text)? {
-                    Scan::Merl => merl_grid(options.merl_angles),
-                    other => other,
-                },
-                None if format == Format::Merl => merl_grid(options.merl_angles),
-                None if flat => Scan::Flat { step_deg: 1.0 },
-                None => Scan::Hemisphere { step_deg: 5.0 },
-            };
+            let scan = scan_of(args, format, material.is_flat(), options.merl_angles)?;
             chain::tabulate(&args.input, &material, &scan, ui.control())?
         }
     };

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::failure::Failure;
 use super::fit::plus_minus;
+use super::output::make_folder;
 use super::ui::{self, Ui};
 use crate::brdf::PerChannel;
 use crate::chain::{Demo, DemoFit, DemoOptions, demo};
@@ -28,6 +29,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    make_folder("--out", &args.out)?;
     let options = DemoOptions { size: args.size, samples: args.samples, seed: args.seed };
     let demo = demo(&args.out, &options, ui.control())?;
     if ui::stop().requested() {

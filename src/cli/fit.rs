@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::{check_folder, write_text};
+use super::output::{check_folder, keeps_inputs, make_folder, write_text};
 use super::ui::{self, Ui};
 use crate::brdf::{FitRecord, Material, ModelChoice, ModelSpec, PerChannel, SpecError};
 use crate::fit::{Bootstrap, FitError, FitOptions, Fitted, Limit, Loss, Robust, WeightMode, fit, fit_best_model};
-use crate::measurement::{Measurement, formats};
+use crate::measurement::{Dimension, Measurement, formats};
 
 const MODEL: &str = "Model and loss";
 const SAMPLES: &str = "Samples and their weights";
@@ -38,14 +38,15 @@ pub(super) struct Args {
     /// What is minimised; docs/fit.md has the formulas
     #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2|log|cuberoot|relative", help_heading = MODEL)]
     loss: Loss,
-    /// Let outliers count less; SCALE times the residuals' σ is where they begin [default SCALE: huber 1.345, cauchy 2.385]
+    /// Let outliers count less; SCALE (1e-3 to 1e6) times the residuals' σ is where they begin [default SCALE: huber 1.345,
+    /// cauchy 2.385]
     #[arg(long, value_name = "huber|cauchy[:SCALE]", help_heading = MODEL)]
     robust: Option<Robust>,
     /// How samples count
     #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform", help_heading = SAMPLES)]
     weights: WeightMode,
     /// Weigh by the σ that the file states, instead of the solid angle
-    #[arg(long, help_heading = SAMPLES)]
+    #[arg(long, conflicts_with = "weights", help_heading = SAMPLES)]
     use_sigma: bool,
     /// Leave out samples with θi or θo above this, degrees
     #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true, help_heading = SAMPLES)]
@@ -56,10 +57,10 @@ pub(super) struct Args {
     /// Let every channel have its own shapes
     #[arg(long, help_heading = MODEL)]
     per_channel: bool,
-    /// Hold a parameter at a value, phong.exponent=50 say; a second lobe of a kind is phong[1]; may be repeated
+    /// Hold a parameter at a value, phong.exponent=50 say; a second lobe of a kind is phong[1]; may be repeated for others
     #[arg(long, value_name = "NAME=VALUE", value_parser = Limit::fixed, help_heading = MODEL)]
     fix: Vec<Limit>,
-    /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated
+    /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated for others
     #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range, help_heading = MODEL)]
     bound: Vec<Limit>,
     /// Fit under the constraint that no channel reflects more light than it receives
@@ -134,6 +135,13 @@ impl Args {
             Wanted::Model(model) => model.clone(),
             Wanted::Auto => "lambert".parse().map_err(|e: SpecError| Failure::work(e.to_string()))?,
         };
+        let limits: Vec<Limit> = self.fix.iter().chain(&self.bound).cloned().collect();
+        if let Some((first, second)) = Limit::doubled(&limits) {
+            let [first, second] = [first, second].map(|i| format!("{} {}", self.typed_by(i), limits[i]));
+            return Err(Failure::usage(format!(
+                "{first} and {second} limit the same parameter; expected one limit a parameter"
+            )));
+        }
         Ok(FitOptions {
             loss: self.loss,
             robust: self.robust,
@@ -142,7 +150,7 @@ impl Args {
             max_angle_deg: self.max_angle,
             stride: self.stride,
             per_channel: self.per_channel,
-            limits: self.fix.iter().chain(&self.bound).cloned().collect(),
+            limits,
             conserve_energy: self.conserve_energy,
             time_budget: self.time_budget,
             target_rmse_excess: self.target_rmse_excess,
@@ -150,17 +158,22 @@ impl Args {
             ..FitOptions::new(model)
         })
     }
+
+    /// The option that limit `i` of all was typed with.
+    fn typed_by(&self, i: usize) -> &'static str {
+        if i < self.fix.len() { "--fix" } else { "--bound" }
+    }
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let targets = targets(args)?;
+    let options = args.options()?;
     if let Some(out) = &args.out {
         check_folder(out)?;
     }
     if let Some(folder) = &args.out_dir {
-        std::fs::create_dir_all(folder).map_err(|e| Failure::output(folder, &e))?;
+        make_folder("--out-dir", folder)?;
     }
-    let options = args.options()?;
     let reading = args.reading.options();
     let (mut text, mut results, mut failures) = (String::new(), Vec::new(), Vec::new());
     // The next file is read while this one is fitted.
@@ -216,8 +229,18 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Where each fit goes; two files of one name are refused before anything is written.
+/// Where each fit goes, checked before anything is read: no fit goes where a measurement or another fit is.
 fn targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
+    let targets = named_targets(args)?;
+    let option = if args.out_dir.is_some() { "--out-dir" } else { "--out" };
+    for target in targets.iter().flatten() {
+        keeps_inputs(option, target, args.files.iter().map(PathBuf::as_path))?;
+    }
+    Ok(targets)
+}
+
+/// Where each fit goes by its name; two of one name are refused.
+fn named_targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
     if args.out.is_some() && args.files.len() > 1 {
         return Err(Failure::usage("--out takes one measurement; use --out-dir for several"));
     }
@@ -252,7 +275,7 @@ fn one(
         Wanted::Auto => fit_best_model(table, options),
         Wanted::Model(_) => fit(table, options),
     };
-    let fitted = fitted.map_err(|error| refused(args, error))?;
+    let fitted = fitted.map_err(|error| refused(args, file, error))?;
     if args.log {
         log(&fitted, ui);
     }
@@ -269,15 +292,19 @@ fn one(
     Ok((said, object))
 }
 
-/// Why there is no fit, with the options named as they were typed.
-fn refused(args: &Args, error: FitError) -> Failure {
+/// Why there is no fit, with the options named as they were typed, and the file where the error does not name it.
+fn refused(args: &Args, file: &Path, error: FitError) -> Failure {
     let held = |name: &str| args.fix.iter().any(|limit| limit.parameter.to_string() == name);
+    let several = args.files.len() > 1;
+    let own = format!("{}: ", file.display());
     let (before, after) = match &error {
-        FitError::Limit { name, .. } if held(name) => ("--fix ", ""),
-        FitError::Limit { .. } => ("--bound ", ""),
-        FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)"),
-        FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)"),
-        _ => ("", ""),
+        FitError::Limit { name, .. } if held(name) => ("--fix ", String::new()),
+        FitError::Limit { .. } => ("--bound ", String::new()),
+        FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)".to_owned()),
+        FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)".to_owned()),
+        FitError::Solver { .. } => (&own[..], String::new()),
+        FitError::Option { .. } if several => ("", format!(" ({})", file.display())),
+        _ => ("", String::new()),
     };
     let failure = Failure::from(error);
     Failure { message: format!("{before}{}{after}", failure.message), ..failure }
@@ -296,7 +323,7 @@ fn log(fitted: &Fitted, ui: &Ui) {
         let shapes: Vec<String> = step.parameters.iter().map(|t| format!("{:.10}", t.exp())).collect();
         ui.note(&format!("  step {i:2}  cost {:.12e}  shape {}", step.cost, shapes.join(" ")));
     }
-    ui.note(&format!("  stopped: {:?}", fitted.stop));
+    ui.note(&format!("  stopped: {}", fitted.stop));
 }
 
 /// A fit in words: every parameter with its standard error, then what else the record says.
@@ -304,13 +331,14 @@ fn describe(name: &str, material: &Material) -> String {
     let mut t = String::new();
     let default = FitRecord::default();
     let record = material.fit.as_ref().unwrap_or(&default);
+    let unit = unit_of(record, material);
     let _ = writeln!(
         t,
-        "{name}: {}, {}, {} samples, rmse {:.6}, {:.3} s",
+        "{name}: {}, {}, {} samples, rmse {}{unit}, {:.3} s",
         material.model(),
         record.status,
         record.samples,
-        record.rmse,
+        small(record.rmse, 3),
         record.seconds
     );
     for (l, lobe) in material.lobes.iter().enumerate() {
@@ -341,7 +369,7 @@ fn describe(name: &str, material: &Material) -> String {
             }
         }
     }
-    t.push_str(&evidence(record, &material.channels));
+    t.push_str(&evidence(record, material));
     for warning in &record.warnings {
         t.push_str(&hanging(&format!("warning: {warning}")));
     }
@@ -351,18 +379,34 @@ fn describe(name: &str, material: &Material) -> String {
 /// Standard error and 95 % interval of a parameter.
 type Stated = (Option<f64>, Option<(f64, f64)>);
 
+/// The unit of the residuals, to be put behind a number; empty where they have none.
+fn unit_of(record: &FitRecord, material: &Material) -> String {
+    let dimension = if material.is_flat() { Dimension::Flat } else { Dimension::Space };
+    match Loss::from_name(&record.loss).map_or("", |loss| loss.unit(dimension)) {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    }
+}
+
+/// Something small, by powers of ten; 0 is 0.
+fn small(x: f64, places: usize) -> String {
+    if x == 0.0 { "0".into() } else { format!("{x:.places$e}") }
+}
+
 /// One line a parameter; its interval only where the error does not tell it: where it is lopsided.
 fn parameter(t: &mut String, record: &FitRecord, label: &str, value: f64, (error, interval): Stated) {
     let open = record.undetermined.iter().any(|name| name == label);
+    let half_width = interval.map(|(low, high)| (high - low) / 2.0);
+    let digits = Digits::of(value, error.or(half_width).unwrap_or(0.0));
     let shown = match error {
-        None if !open => format!("{value:.6} (at the end of its range)"),
+        None if !open => format!("{} (at the end of its range)", plain(value)),
         _ => plus_minus(value, error),
     };
     let _ = write!(t, "  {label:22} {shown}");
     if let Some((low, high)) = interval {
         let (below, above) = (value - low, high - value);
         if below.max(above) > LOPSIDED * below.min(above) {
-            let _ = write!(t, "  (95 %: {} to {})", digits(low), digits(high));
+            let _ = write!(t, "  (95 %: {} to {})", digits.show(low), digits.show(high));
         }
     }
     t.push('\n');
@@ -381,25 +425,28 @@ fn digits(x: f64) -> String {
 }
 
 /// What else the numbers say: the noise and the model's own error, how the minimum was found, how the model was chosen.
-fn evidence(record: &FitRecord, channels: &[String]) -> String {
+fn evidence(record: &FitRecord, material: &Material) -> String {
     let mut t = String::new();
+    let unit = unit_of(record, material);
     let mut say = |text: String| t.push_str(&hanging(&text));
     if let (Some(robust), [first, ..]) = (&record.robust, &record.robust_scale[..]) {
         let others = if record.robust_scale.len() > 1 { " (the first channel's)" } else { "" };
-        say(format!("robust {robust}: residuals beyond {first:.3e}{others} count less"));
+        say(format!("robust {robust}: residuals beyond {}{unit}{others} count less", small(*first, 3)));
     }
     if !record.relative_epsilon.is_empty() {
-        let each = channels.iter().zip(&record.relative_epsilon).map(|(c, e)| format!("{c} {e:.3e}"));
-        say(format!("ε of the relative loss: {}", each.collect::<Vec<_>>().join(", ")));
+        let each = material.channels.iter().zip(&record.relative_epsilon).map(|(c, e)| format!("{c} {}", small(*e, 3)));
+        let of_value = if material.is_flat() { "1/rad" } else { "1/sr" };
+        say(format!("ε of the relative loss: {} {of_value}", each.collect::<Vec<_>>().join(", ")));
     }
     if let Some(r) = &record.residual {
         let from = if r.noise_from == "sigma" { "as the file states" } else { "from neighbours" };
-        let model =
-            if r.model_rmse > 0.0 { format!("model error {:.2e}", r.model_rmse) } else { "no model error seen".into() };
-        say(format!(
-            "residuals: noise {:.2e} ({from}), {model}; worth {:.0} samples",
-            r.noise_rmse, r.effective_samples
-        ));
+        let model = match r.model_rmse {
+            0.0 => "no model error seen".into(),
+            rmse => format!("model error {}{unit}", small(rmse, 2)),
+        };
+        let noise = small(r.noise_rmse, 2);
+        let worth = r.effective_samples;
+        say(format!("residuals: noise {noise}{unit} ({from}), {model}; worth {worth:.0} independent values"));
     }
     if let Some(e) = &record.energy {
         say(format!("energy: reflects {:.1} % of the light at most", 100.0 * e.largest));
@@ -431,7 +478,7 @@ fn evidence(record: &FitRecord, channels: &[String]) -> String {
         say(text);
     }
     if let Some(choice) = &record.choice {
-        t.push_str(&comparison(choice));
+        t.push_str(&comparison(choice, record, &unit));
     }
     t
 }
@@ -467,18 +514,37 @@ fn redrawn(record: &FitRecord) -> Option<String> {
     })
 }
 
-/// The models compared, as a table.
-fn comparison(choice: &ModelChoice) -> String {
-    let mut t = String::from("  model                      par.       rmse   held out       AICc        BIC\n");
+/// The models compared, as a table; the rmse in it has a `unit`.
+fn comparison(choice: &ModelChoice, record: &FitRecord, unit: &str) -> String {
+    let width = choice.candidates.iter().map(|c| c.model.len()).fold(26, usize::max);
+    let mut t = format!("  {:width$} par.       rmse   held out       AICc        BIC\n", "model");
     for c in &choice.candidates {
         let mark = if c.model == choice.chosen { "*" } else { " " };
         let _ = writeln!(
             t,
-            "{mark} {:26} {:4} {:10.3e} {:10.3e} {:10.1} {:10.1}",
+            "{mark} {:width$} {:4} {:10.3e} {:10.3e} {:10.1} {:10.1}",
             c.model, c.parameters, c.rmse, c.held_out_rmse, c.aicc, c.bic
         );
     }
-    t + &hanging(&format!("chosen: {}: {}", choice.chosen, choice.reason))
+    for line in [basis(choice, record, unit), Some(format!("chosen: {}: {}", choice.chosen, choice.reason))] {
+        line.iter().for_each(|line| t.push_str(&hanging(line)));
+    }
+    t
+}
+
+/// What the table's rmse are of: their unit, and why the chosen model's differs from that of the fit.
+fn basis(choice: &ModelChoice, record: &FitRecord, unit: &str) -> Option<String> {
+    let part = match (choice.samples, &record.subset) {
+        (Some(n), _) => Some(format!("of {n} samples spread over the file")),
+        (None, Some(_)) => Some("of all samples".to_owned()),
+        (None, None) => None,
+    };
+    let robust = record.robust.as_ref().map(|_| "with the robust scale of the richest model for all".to_owned());
+    let unit = (!unit.is_empty()).then(|| format!("in{unit}"));
+    let differs = part.is_some() || robust.is_some();
+    let facts: Vec<String> = [unit, part, robust].into_iter().flatten().collect();
+    let more = if differs { ", so they can differ from the rmse above" } else { "" };
+    (!facts.is_empty()).then(|| format!("rmse and held out are {}{more}", facts.join(", ")))
 }
 
 /// Columns that prose is wrapped at.
@@ -501,19 +567,54 @@ fn hanging(text: &str) -> String {
 
 /// `0.3201 ± 0.0004`: the error to two digits, the value to the same place; powers of ten where that would be long.
 pub(super) fn plus_minus(value: f64, error: Option<f64>) -> String {
-    let Some(error) = error else { return format!("{value:.6} (undetermined)") };
+    let Some(error) = error else { return format!("{} (undetermined)", plain(value)) };
     if error == 0.0 {
-        return format!("{value}");
+        return if value == 0.0 || (1e-4..1e9).contains(&value) { value.to_string() } else { format!("{value:e}") };
     }
-    let places = 1.0 - error.log10().floor();
-    if (-4.0..0.0).contains(&places) {
-        return format!("{value:.0} ± {error:.0}");
+    let digits = Digits::of(value, error);
+    format!("{} ± {}", digits.show(value), digits.show_error(error))
+}
+
+/// Six decimals; powers of ten for what is very small or large.
+fn plain(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e9).contains(&value.abs()) { format!("{value:.6}") } else { format!("{value:.6e}") }
+}
+
+/// To which decimal place numbers about as large as a value are shown.
+#[derive(Debug, Clone, Copy)]
+struct Digits {
+    /// The place of the error's second digit: 10^last.
+    last: i32,
+    /// Whether by powers of ten.
+    powers: bool,
+}
+
+impl Digits {
+    /// Most decimals without powers of ten.
+    const DECIMALS: i32 = 9;
+
+    /// As many as an error of the value leaves; of an error of 0, six decimals.
+    fn of(value: f64, error: f64) -> Self {
+        let last = if error > 0.0 { error.log10().floor() as i32 - 1 } else { -6 };
+        let size = value.abs().max(error);
+        Self { last, powers: !((1e-4..1e6).contains(&size) || size == 0.0) }
     }
-    if (0.0..=9.0).contains(&places) {
-        let places = places as usize;
-        return format!("{value:.places$} ± {error:.places$}");
+
+    fn show(self, x: f64) -> String {
+        let decimals = (-self.last).clamp(0, Self::DECIMALS) as usize;
+        if !self.powers {
+            return format!("{x:.decimals$}");
+        }
+        if x == 0.0 {
+            return "0".into();
+        }
+        let places = (x.abs().log10().floor() as i32 - self.last).clamp(1, 16) as usize;
+        format!("{x:.places$e}")
     }
-    format!("{value:.9} ± {error:.1e}")
+
+    fn show_error(self, error: f64) -> String {
+        if self.powers || self.last < -Self::DECIMALS { format!("{error:.1e}") } else { self.show(error) }
+    }
 }
 
 #[cfg(test)]
@@ -540,11 +641,31 @@ mod tests {
     }
 
     #[test]
+    fn an_interval_has_the_digits_of_its_value() {
+        let shown = |label: &str, value: f64, error: Option<f64>, interval: (f64, f64)| {
+            let mut t = String::new();
+            parameter(&mut t, &FitRecord::default(), label, value, (error, Some(interval)));
+            t
+        };
+        let text = shown("phong.exponent", 11.9955, Some(0.0033), (11.9921, 12.004));
+        assert_eq!(text, "  phong.exponent         11.9955 ± 0.0033  (95 %: 11.9921 to 12.0040)\n");
+        let text = shown("phong.exponent", 60.0, None, (60.0, 60.123_4));
+        assert!(text.ends_with("60.000000 (at the end of its range)  (95 %: 60.000 to 60.123)\n"), "{text}");
+        let text = shown("w", 1e-150, Some(2e-151), (0.0, 3e-150));
+        assert!(text.ends_with("1.00e-150 ± 2.0e-151  (95 %: 0 to 3.00e-150)\n"), "{text}");
+    }
+
+    #[test]
     fn errors_are_shown_to_two_digits() {
         assert_eq!(plus_minus(0.320_123, Some(0.000_41)), "0.32012 ± 0.00041");
         assert_eq!(plus_minus(312.49, Some(12.3)), "312 ± 12");
         assert_eq!(plus_minus(79.53, Some(134.2)), "80 ± 134");
-        assert_eq!(plus_minus(0.314, Some(7e29)), "0.314000000 ± 7.0e29");
+        assert_eq!(plus_minus(0.314, Some(7e29)), "3.1e-1 ± 7.0e29");
+        assert_eq!(plus_minus(1.234_56e-150, Some(1.2e-153)), "1.2346e-150 ± 1.2e-153");
+        assert_eq!(plus_minus(1.5e150, Some(2e148)), "1.500e150 ± 2.0e148");
+        assert_eq!(plus_minus(1e-150, Some(0.003)), "0.0000 ± 0.0030");
+        assert_eq!(plus_minus(2e-150, Some(0.0)), "2e-150");
+        assert_eq!(plus_minus(2e-150, None), "2.000000e-150 (undetermined)");
         assert_eq!(plus_minus(0.3, Some(1e-15)), "0.300000000 ± 1.0e-15");
         assert_eq!(plus_minus(0.5, Some(0.0)), "0.5");
         assert_eq!(plus_minus(1.5, None), "1.500000 (undetermined)");

@@ -28,9 +28,9 @@ pub(super) struct Reading {
     /// What the values are (default: as the file says)
     #[arg(long, value_parser = parse_quantity, value_name = "brdf|brdf_cos")]
     quantity: Option<Quantity>,
-    /// Where in its bin a MERL entry is read
-    #[arg(long, default_value = "center", value_parser = parse_angles, value_name = "center|edge")]
-    merl_angles: MerlAngles,
+    /// Where in its bin a MERL entry is read; for MERL tables only [default: center]
+    #[arg(long, value_parser = parse_angles, value_name = "center|edge")]
+    merl_angles: Option<MerlAngles>,
 }
 
 fn parse_format(text: &str) -> Result<Format, String> {

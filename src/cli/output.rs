@@ -45,10 +45,44 @@ fn closed_pipe_is_fine(result: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// The folder of an output must be there before long work starts.
+/// An output that is one of the inputs would destroy it; `option` is what the output was named by. Links and `./` are looked through;
+/// what is no regular file (a terminal, `/dev/null`) can be both.
+pub(super) fn keeps_inputs<'a>(
+    option: &str,
+    out: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    let file =
+        |path: &Path| if path == Path::new("-") { None } else { path.canonicalize().ok().filter(|p| p.is_file()) };
+    let Some(target) = file(out) else { return Ok(()) };
+    match inputs.into_iter().find(|input| file(input).is_some_and(|f| f == target)) {
+        None => Ok(()),
+        Some(input) => Err(Failure::usage(format!(
+            "{option}: writing {} would destroy the input {}; expected another name",
+            out.display(),
+            input.display()
+        ))),
+    }
+}
+
+/// Makes a folder for outputs where there is none yet.
+pub(super) fn make_folder(option: &str, folder: &Path) -> Result<(), Failure> {
+    match std::fs::create_dir_all(folder) {
+        Ok(()) => Ok(()),
+        Err(e) if matches!(e.kind(), io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory) => {
+            Err(Failure::usage(format!("{option}: expected a folder, but {} is or lies in a file", folder.display())))
+        }
+        Err(e) => Err(Failure::output(folder, &e)),
+    }
+}
+
+/// The folder of an output must be there before long work starts, and the output be no folder itself.
 pub(super) fn check_folder(out: &Path) -> Result<(), Failure> {
     if out == Path::new("-") {
         return Ok(());
+    }
+    if out.is_dir() {
+        return Err(Failure::usage(format!("{}: expected the name of a file, found a folder", out.display())));
     }
     let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     if folder.is_dir() { Ok(()) } else { Err(Failure::usage(format!("{}: there is no such folder", folder.display()))) }

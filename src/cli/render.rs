@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{check_folder, read_text, stdout_is_free, write_bytes};
+use super::output::{check_folder, keeps_inputs, read_text, stdout_is_free, write_bytes};
 use super::ui::{self, Ui};
 use crate::chain::{self, Stage};
 use crate::image::{Image, develop, encode_exr, encode_png, exposure_for};
@@ -90,6 +90,10 @@ impl PictureArgs {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    for (option, out) in [("--out", Some(&args.out)), ("--png", args.png.as_ref())] {
+        let inputs = [args.file.as_deref(), args.material.as_deref().map(Path::new)];
+        out.map_or(Ok(()), |out| keeps_inputs(option, out, inputs.into_iter().flatten()))?;
+    }
     let stage = match &args.file {
         Some(path) => read_stage(path)?,
         None => args.picture.stage()?,

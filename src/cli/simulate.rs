@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{check_folder, output_format, read_text, stdout_is_free, write_measurement};
+use super::output::{check_folder, keeps_inputs, output_format, read_text, stdout_is_free, write_measurement};
 use super::ui::Ui;
 use crate::chain;
 use crate::gonio::{Instrument, Scan, SimulationSpec};
@@ -82,6 +82,7 @@ struct Plan {
 
 impl Plan {
     fn new(args: &Args) -> Result<Self, Failure> {
+        keeps_inputs("--out", &args.out, args.spec.as_deref())?;
         let spec = args.spec.as_deref().map(read_spec).transpose()?;
         let base = args.spec.as_deref().and_then(Path::parent).unwrap_or_else(|| Path::new(""));
         let of_spec = spec.as_ref();
@@ -93,13 +94,16 @@ impl Plan {
             }
         };
         let scan = match (&args.scan, of_spec.and_then(|s| s.scan.as_ref())) {
-            (Some(typed), _) => parse_scan(typed)?,
-            (None, Some(written)) => match written.strip_prefix("list:") {
-                Some(file) => parse_scan(&format!("list:{}", relative_to(base, file)))?,
-                None => parse_scan(written)?,
-            },
-            (None, None) => Scan::Hemisphere { step_deg: 5.0 },
+            (Some(typed), _) => Some(typed.clone()),
+            (None, Some(written)) => Some(match written.strip_prefix("list:") {
+                Some(file) => format!("list:{}", relative_to(base, file)),
+                None => written.clone(),
+            }),
+            (None, None) => None,
         };
+        let list = scan.as_ref().and_then(|s| s.strip_prefix("list:"));
+        keeps_inputs("--out", &args.out, [Some(&material[..]), list].into_iter().flatten().map(Path::new))?;
+        let scan = scan.map_or(Ok(Scan::Hemisphere { step_deg: 5.0 }), |text| parse_scan(&text))?;
         let mut instrument = of_spec.map_or_else(Instrument::default, |s| s.instrument);
         if args.noiseless {
             instrument = Instrument::noiseless();

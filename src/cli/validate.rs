@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::write_text;
+use super::output::{keeps_inputs, make_folder, write_text};
 use super::render::{PictureArgs, parse_exposure};
 use super::ui::{self, Ui};
 use crate::brdf::Material;
@@ -36,6 +36,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let inputs = args.fits.iter().map(Path::new).chain([args.measurement.as_path()]);
+    keeps_inputs("--out", &args.out.join("numbers.json"), inputs)?;
     let stage = args.picture.stage()?;
     let table = formats::read(&args.measurement, &args.reading.options())?;
     for note in &table.notes {
@@ -53,7 +55,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         let source = Source::Fitted(Box::new(material.clone()));
         subjects.push((label(file, material, fits.len()), chain::render_material(file, &source, rgb)?));
     }
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::output(&args.out, &e))?;
+    make_folder("--out", &args.out)?;
     let mut shown = Vec::new();
     for (k, (label, subject)) in subjects.into_iter().enumerate() {
         if !ui::stop().requested() {

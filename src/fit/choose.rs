@@ -25,21 +25,49 @@ const SAMPLES: usize = 40_000;
 /// A held-out error within this share of the best is as good.
 const AS_GOOD: f64 = 0.01;
 
-/// Compares all models and fits the simplest one whose held-out error is as good as the best's. `options.model` is not looked at.
+/// Compares all models and fits the simplest one whose held-out error is as good as the best's. `options.model` is not looked at. A limit
+/// concerns the models that have its parameter.
 ///
 /// # Errors
-/// As [`fit`].
+/// As [`fit`]; a limit that concerns no model.
 pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
     options.validate(measurement)?;
+    let models = models(measurement, options)?;
+    for limit in &options.limits {
+        let last = models.last().filter(|_| !models.iter().any(|m| concerns(limit, m, measurement)));
+        last.map_or(Ok(()), |richest| ranges_of(limit, richest, measurement).map(|_| ()))?;
+    }
+    let choice = choose(&compare(&models, measurement, options)?);
+    let model = choice.chosen.parse().map_err(|_| FitError::Solver { reason: "no model was chosen".into() })?;
+    let (limits, idle): (Vec<Limit>, Vec<Limit>) =
+        options.limits.iter().cloned().partition(|limit| concerns(limit, &model, measurement));
+    let mut fitted = fit(measurement, &FitOptions { model, limits, ..options.clone() })?;
+    if let Some(record) = &mut fitted.material.fit {
+        let said = idle.iter().map(|limit| format!("{limit} limits nothing: {} has no such parameter", choice.chosen));
+        record.warnings.extend(said);
+        record.choice = Some(choice);
+    }
+    Ok(fitted)
+}
+
+/// The models that are compared, in the measurement's world.
+fn models(measurement: &Measurement, options: &FitOptions) -> Result<Vec<ModelSpec>, FitError> {
+    let model = |name: &str| {
+        let model = name.parse().map_err(|_| FitError::Solver { reason: format!("no model {name}") })?;
+        FitOptions { model, ..options.clone() }.model_for(measurement)
+    };
+    CANDIDATES.into_iter().map(model).collect()
+}
+
+/// Every model's errors.
+fn compare(models: &[ModelSpec], measurement: &Measurement, options: &FitOptions) -> Result<Vec<Tried>, FitError> {
     let mut candidates = Vec::new();
     let mut effective = None;
     // The richest first: its residuals set the robust scale by which all are judged.
     let mut common = None;
-    for name in CANDIDATES.into_iter().rev() {
-        let spec: ModelSpec = name.parse().map_err(|_| FitError::Solver { reason: format!("no model {name}") })?;
-        // A limit of a lobe that a candidate lacks does not concern it.
-        let limits = options.limits.iter().filter(|l| concerns(l, &spec, measurement)).cloned().collect();
-        let own = FitOptions { model: spec, limits, bootstrap: None, time_budget: None, ..options.clone() };
+    for model in models.iter().rev() {
+        let limits = options.limits.iter().filter(|l| concerns(l, model, measurement)).cloned().collect();
+        let own = FitOptions { model: model.clone(), limits, bootstrap: None, time_budget: None, ..options.clone() };
         let tried = candidate(measurement, &own, &mut common)?;
         // Residuals are the less alike the better the model: the richest one's tell best how many there are.
         effective = effective.or(tried.effective);
@@ -48,13 +76,7 @@ pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result
     for tried in &mut candidates {
         tried.candidate.judge(effective.unwrap_or(measurement.len() as f64));
     }
-    let choice = choose(&candidates);
-    let model = choice.chosen.parse().map_err(|_| FitError::Solver { reason: "no model was chosen".into() })?;
-    let mut fitted = fit(measurement, &FitOptions { model, ..options.clone() })?;
-    if let Some(record) = &mut fitted.material.fit {
-        record.choice = Some(choice);
-    }
-    Ok(fitted)
+    Ok(candidates)
 }
 
 /// One model's errors on the samples it was fitted to and on those it was not.
@@ -73,7 +95,7 @@ fn candidate(
     let thin = Thin { step: measurement.len().div_ceil(SAMPLES), run };
     let (mut cost, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
     let mut effective = Some(0.0);
-    let mut own = Vec::new();
+    let (mut own, mut directions) = (Vec::new(), 0);
     for (k, group) in groups.into_iter().enumerate() {
         let (samples, _) = Samples::gather(measurement, &model, options, group, thin)?;
         let samples = samples.listed(|_| true);
@@ -86,6 +108,7 @@ fn candidate(
             sums.iter().map(|s| s.cost).sum::<f64>() * unit
         };
         cost += cost_on(&whole.solution, &samples);
+        directions = directions.max(samples.len());
         residuals += samples.residuals();
         parameters += whole.uncertainty.errors.len();
         effective = effective.zip(whole.structure).map(|(sum, s)| sum + s.effective_samples);
@@ -111,7 +134,8 @@ fn candidate(
         aicc: f64::NAN,
         bic: f64::NAN,
     };
-    Ok(Tried { candidate, effective, folds: held_out.into_iter().map(rms).collect() })
+    let part = (thin.step > 1).then_some(directions as u64);
+    Ok(Tried { candidate, effective, folds: held_out.into_iter().map(rms).collect(), part })
 }
 
 /// A model's errors.
@@ -121,11 +145,17 @@ struct Tried {
     effective: Option<f64>,
     /// Held-out rmse of every fold.
     folds: Vec<f64>,
+    /// Directions looked at, where not all were.
+    part: Option<u64>,
 }
 
 /// Whether a model has the parameter that a limit is about.
 fn concerns(limit: &Limit, model: &ModelSpec, measurement: &Measurement) -> bool {
-    Ranges::new(model, &measurement.channels, std::slice::from_ref(limit)).is_ok()
+    ranges_of(limit, model, measurement).is_ok()
+}
+
+fn ranges_of(limit: &Limit, model: &ModelSpec, measurement: &Measurement) -> Result<Ranges, FitError> {
+    Ranges::new(model, &measurement.channels, std::slice::from_ref(limit))
 }
 
 /// The fold of every sample, by its cell of (θi, θo).
@@ -163,7 +193,7 @@ fn choose(tried: &[Tried]) -> ModelChoice {
     };
     let candidates: Vec<ModelCandidate> = tried.iter().map(|t| t.candidate.clone()).collect();
     let Some(best) = tried.iter().min_by(|a, b| error(a).total_cmp(&error(b))) else {
-        return ModelChoice { chosen: String::new(), reason: String::new(), candidates };
+        return ModelChoice { chosen: String::new(), reason: String::new(), candidates, samples: None };
     };
     let good = |t: &&Tried| {
         let (excess, error) = excess(t, best);
@@ -187,5 +217,5 @@ fn choose(tried: &[Tried]) -> ModelChoice {
     if let Some(next) = next {
         let _ = write!(reason, "; the best simpler model's is {:.1} % higher", 100.0 * (next / own - 1.0));
     }
-    ModelChoice { chosen: chosen.candidate.model.clone(), reason, candidates }
+    ModelChoice { chosen: chosen.candidate.model.clone(), reason, candidates, samples: best.part }
 }

@@ -45,7 +45,7 @@ impl Limit {
     /// What is wrong with the text.
     pub fn fixed(text: &str) -> Result<Self, String> {
         let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, phong.exponent=50 say")?;
-        let value = number(value)?;
+        let value = finite(value)?;
         Ok(Self { parameter: name.parse()?, low: value, high: value })
     }
 
@@ -57,27 +57,72 @@ impl Limit {
         let expected = "expected NAME=LOW..HIGH, phong.exponent=1..1e4 say";
         let (name, range) = text.split_once('=').ok_or(expected)?;
         let (low, high) = range.split_once("..").ok_or(expected)?;
-        let low = if low.trim().is_empty() { 0.0 } else { number(low)? };
+        let low = if low.trim().is_empty() { 0.0 } else { finite(low)? };
         let high = if high.trim().is_empty() { f64::INFINITY } else { number(high)? };
         if low > high {
-            return Err(format!("the range {low}..{high} is empty"));
+            return Err(format!("the range {} is empty", span(low, high)));
         }
         Ok(Self { parameter: name.parse()?, low, high })
     }
+
+    /// The first two of these that limit one parameter: only one of them could hold. `lambert.weight` is about `lambert.weight[r]` too.
+    #[must_use]
+    pub fn doubled(limits: &[Self]) -> Option<(usize, usize)> {
+        let earlier = |j: usize| limits[..j].iter().position(|l| l.parameter.overlaps(&limits[j].parameter));
+        (0..limits.len()).find_map(|j| earlier(j).map(|i| (i, j)))
+    }
+
+    fn is_fixed(&self) -> bool {
+        self.low == self.high
+    }
+
+    /// Its values as they are typed.
+    fn values(&self) -> String {
+        if self.is_fixed() { short(self.low) } else { span(self.low, self.high) }
+    }
+
+    /// What of it lies in the range `searched` for a shape; a fixed value may lie below that, at n = 0 say. What is wrong where nothing
+    /// does.
+    fn of_shape(&self, searched: (f64, f64)) -> Result<(f64, f64), String> {
+        let (low, high) = searched;
+        if self.is_fixed() {
+            let value = self.low.max(TINY_SHAPE);
+            return if value <= high {
+                Ok((value, value))
+            } else {
+                Err(format!("a value up to {}, where the range that is searched ends", short(high)))
+            };
+        }
+        if self.low > high || self.high < low {
+            return Err(format!("a range that meets {}, which is what is searched", span(low, high)));
+        }
+        Ok((self.low.max(low), self.high.min(high)))
+    }
+}
+
+/// Shortly, and exactly: by powers of ten where that is shorter.
+fn short(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e6).contains(&x) { x.to_string() } else { format!("{x:e}") }
+}
+
+/// `LOW..HIGH`, without an end that is none.
+fn span(low: f64, high: f64) -> String {
+    format!("{}..{}", short(low), if high == f64::INFINITY { String::new() } else { short(high) })
 }
 
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.low == self.high {
-            return write!(f, "{}={}", self.parameter, self.low);
-        }
-        write!(f, "{}={}..{}", self.parameter, self.low, self.high)
+        write!(f, "{}={}", self.parameter, self.values())
     }
 }
 
 fn number(text: &str) -> Result<f64, String> {
     let value: f64 = text.trim().parse().map_err(|_| format!("\"{}\" is not a number", text.trim()))?;
     if value >= 0.0 { Ok(value) } else { Err(format!("{value} is not a number ≥ 0")) }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| if value.is_finite() { Ok(value) } else { Err(format!("{value} is not finite")) })
 }
 
 impl FromStr for ParameterName {
@@ -124,6 +169,17 @@ impl ParameterName {
             0 => self.kind.name().into(),
             k => format!("{}[{k}]", self.kind.name()),
         }
+    }
+
+    /// Whether some parameter goes by both names; a lobe and its flat twin are one.
+    fn overlaps(&self, other: &Self) -> bool {
+        let lobe = |name: &Self| (name.kind.flat_twin(), name.occurrence);
+        let same = match (&self.field, &other.field) {
+            (Field::Weight(Some(a)), Field::Weight(Some(b))) | (Field::Shape(a), Field::Shape(b)) => a == b,
+            (Field::Weight(_), Field::Weight(_)) => true,
+            _ => false,
+        };
+        same && lobe(self) == lobe(other)
     }
 }
 
@@ -186,15 +242,8 @@ impl Ranges {
                 let before: usize = model.lobes()[..lobe].iter().map(|k| k.lobe().parameters().len()).sum();
                 let parameters = kind.lobe().parameters();
                 let own = parameters.iter().position(|p| p.name == shape).unwrap_or(0);
-                let (low, high) = parameters[own].bounds;
-                if limit.low > high || limit.high < if limit.low == limit.high { 0.0 } else { low } {
-                    let found = format!("{}..{}", limit.low, limit.high);
-                    return Err(wrong(format!("a range that meets {low}..{high}"), found));
-                }
-                // A fixed shape may lie below the range that is searched, at n = 0 say.
-                let fixed = limit.low == limit.high;
-                let low = if fixed { limit.low.max(TINY_SHAPE) } else { limit.low.max(low) };
-                self.shapes[before + own] = (low, limit.high.min(high).max(low));
+                let met = limit.of_shape(parameters[own].bounds);
+                self.shapes[before + own] = met.map_err(|expected| wrong(expected, limit.values()))?;
             }
         }
         Ok(())
@@ -241,6 +290,31 @@ mod tests {
     }
 
     #[test]
+    fn limits_are_written_as_they_are_typed() {
+        for text in
+            ["phong.exponent=1..1e8", "phong.exponent=1..", "lambert.weight=0..1e-150", "phong[1].exponent=0..7"]
+        {
+            assert_eq!(Limit::range(text).expect(text).to_string(), text);
+        }
+        assert_eq!(Limit::fixed("lambert.weight=1e150").expect("a value").to_string(), "lambert.weight=1e150");
+        assert!(Limit::fixed("phong.exponent=inf").is_err() && Limit::range("phong.exponent=inf..").is_err());
+    }
+
+    #[test]
+    fn two_limits_of_one_parameter_are_found() {
+        let limits =
+            |texts: &[&str]| -> Vec<Limit> { texts.iter().map(|t| Limit::fixed(t).expect("a value")).collect() };
+        for (texts, want) in [
+            (&["phong.exponent=1", "lambert.weight=1", "phong.exponent=1"][..], Some((0, 2))),
+            (&["lambert.weight[r]=1", "lambert.weight=1"], Some((0, 1))),
+            (&["phong.exponent=1", "phong2d.exponent=2"], Some((0, 1))),
+            (&["lambert.weight[r]=1", "lambert.weight[g]=1", "phong.weight=1", "phong[1].weight=1"], None),
+        ] {
+            assert_eq!(Limit::doubled(&limits(texts)), want, "{texts:?}");
+        }
+    }
+
+    #[test]
     fn limits_find_their_parameter_or_say_that_there_is_none() {
         let channels = ["r".to_owned(), "g".to_owned()];
         let ranges = |model: &str, limits: &[&str]| {
@@ -256,7 +330,13 @@ mod tests {
         for (model, limit, says) in [
             ("lambert", "phong.exponent=1..2", "model lambert"),
             ("lambert+phong", "phong[1].exponent=1..2", "phong[1].exponent"),
-            ("lambert+phong", "phong.exponent=1e9..1e10", "meets"),
+            (
+                "lambert+phong",
+                "phong.exponent=1e9..1e10",
+                "meets 0.01..1e8, which is what is searched, found 1e9..1e10",
+            ),
+            ("lambert+phong", "phong.exponent=1e9..1e9", "up to 1e8, where the range that is searched ends, found 1e9"),
+            ("lambert+phong", "phong.exponent=0..0.001", "found 0..0.001"),
             ("lambert+phong", "phong.weight[b]=0..1", "r, g"),
         ] {
             let error = ranges(model, &[limit]).expect_err(limit).to_string();

@@ -1,5 +1,6 @@
 //! What is minimised: the residual of one value, and how large residuals count.
 
+use crate::measurement::Dimension;
 use crate::numeric::simd::{exp, ln, ln_1p};
 
 /// The residual r of one sample and channel, of the model's value f, the measured value y and c = cosθi.
@@ -116,6 +117,18 @@ impl Loss {
         }
     }
 
+    /// The unit of r in words, empty where it has none.
+    #[must_use]
+    pub fn unit(self, dimension: Dimension) -> &'static str {
+        match (self, dimension) {
+            (Self::L2 | Self::CosineL2, Dimension::Space) => "1/sr",
+            (Self::L2 | Self::CosineL2, Dimension::Flat) => "1/rad",
+            (Self::CubeRoot, Dimension::Space) => "sr^(-1/3)",
+            (Self::CubeRoot, Dimension::Flat) => "rad^(-1/3)",
+            (Self::Log | Self::Relative, _) => "",
+        }
+    }
+
     /// The unit of r², when values are divided by `scale` first: the cost in the data's own unit is this times the scaled one.
     pub(super) fn cost_unit(self, scale: f64) -> f64 {
         match self {
@@ -173,12 +186,16 @@ pub enum RobustKind {
     Cauchy,
 }
 
+/// Scales that a robust loss can have: below, everything is an outlier, and beyond, nothing is.
+pub(super) const ROBUST_SCALES: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+
 /// A robust loss.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Robust {
     /// Which.
     pub kind: RobustKind,
-    /// s as a multiple of the residuals' σ, which is 1.4826 × their median absolute deviation from their median. Positive.
+    /// s as a multiple of the residuals' σ, which is 1.4826 × their median absolute deviation from their median. From 10⁻³ to
+    /// 10⁶.
     pub scale: f64,
 }
 
@@ -234,10 +251,10 @@ impl std::str::FromStr for Robust {
             None => kind.default_scale(),
             Some(text) => text.parse().map_err(|_| format!("the scale \"{text}\" is not a number"))?,
         };
-        if scale > 0.0 && f64::is_finite(scale) {
+        if ROBUST_SCALES.contains(&scale) {
             Ok(Self { kind, scale })
         } else {
-            Err(format!("the scale must be positive and finite, not {scale}"))
+            Err(format!("expected a scale from 1e-3 to 1e6, found {scale:e}"))
         }
     }
 }
@@ -388,7 +405,7 @@ mod tests {
         }
         assert_eq!("huber".parse(), Ok(Robust { kind: RobustKind::Huber, scale: 1.345 }));
         assert_eq!("cauchy:3".parse(), Ok(Robust { kind: RobustKind::Cauchy, scale: 3.0 }));
-        for wrong in ["tukey", "huber:", "cauchy:-1", "cauchy:inf", "cauchy:NaN"] {
+        for wrong in ["tukey", "huber:", "cauchy:-1", "cauchy:inf", "cauchy:NaN", "huber:9e-4", "huber:1e300"] {
             assert!(wrong.parse::<Robust>().is_err(), "{wrong}");
         }
     }

@@ -19,6 +19,7 @@ mod joint;
 mod limits;
 mod loss;
 mod merl_lines;
+mod missing;
 mod offset;
 mod options;
 mod part;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::limits::Limit;
-use super::loss::{Loss, Robust};
+use super::loss::{Loss, ROBUST_SCALES, Robust};
 use crate::brdf::ModelSpec;
 use crate::measurement::{Dimension, Measurement};
 
@@ -56,7 +56,7 @@ pub struct FitOptions {
     pub stride: usize,
     /// Shapes of their own for every channel.
     pub per_channel: bool,
-    /// Ranges of single parameters; a range of one point fixes it.
+    /// Ranges of single parameters, one a parameter at most; a range of one point fixes it.
     pub limits: Vec<Limit>,
     /// Fit under the constraint that no channel reflects more than it receives.
     pub conserve_energy: bool,
@@ -103,11 +103,15 @@ impl FitOptions {
         if let Some(excess) = self.target_rmse_excess.filter(|e| !(*e > 0.0 && e.is_finite())) {
             return wrong("target-rmse-excess", "a positive share", excess.to_string());
         }
-        if let Some(robust) = self.robust.filter(|r| !(r.scale > 0.0 && r.scale.is_finite())) {
-            return wrong("robust", "a positive scale", robust.scale.to_string());
+        if let Some(robust) = self.robust.filter(|r| !ROBUST_SCALES.contains(&r.scale)) {
+            return wrong("robust", "a scale from 1e-3 to 1e6", format!("{:e}", robust.scale));
         }
         if let Some(few) = self.bootstrap.filter(|b| b.replicates < 2) {
             return wrong("bootstrap", "at least 2 replicates", few.replicates.to_string());
+        }
+        if let Some((first, second)) = Limit::doubled(&self.limits) {
+            let [first, second] = [first, second].map(|i| self.limits[i].to_string());
+            return Err(FitError::LimitTwice { first, second });
         }
         if self.use_sigma && measurement.sigma.is_none() {
             return wrong("use-sigma", "a measurement that states sigma", "none stated".into());
@@ -152,6 +156,14 @@ pub enum FitError {
         expected: String,
         /// What of it does not fit.
         found: String,
+    },
+    /// Two limits of one parameter.
+    #[error("{first} and {second} limit the same parameter; expected one limit a parameter")]
+    LimitTwice {
+        /// One of them.
+        first: String,
+        /// The other.
+        second: String,
     },
     /// Limits that can't all be met.
     #[error(

@@ -45,7 +45,8 @@ impl Quadratic {
     /// In `n` unknowns; those of columns that are 0, or as good as that, don't count.
     pub fn new(n: usize, gram: impl Fn(usize, usize) -> f64, b: impl Fn(usize) -> f64) -> Self {
         // NaN is visible, so that it is not hidden.
-        let visible: [bool; MAX_LOBES] = std::array::from_fn(|i| i < n && !(gram(i, i) < INVISIBLE));
+        let visible: [bool; MAX_LOBES] =
+            std::array::from_fn(|i| i < n && (gram(i, i) >= INVISIBLE || gram(i, i).is_nan()));
         let row = |of: &dyn Fn(usize) -> f64| -> Row { std::array::from_fn(|j| if visible[j] { of(j) } else { 0.0 }) };
         let gram = std::array::from_fn(|i| if visible[i] { row(&|j| gram(i, j)) } else { Row::default() });
         Self { n, gram, b: row(&b) }

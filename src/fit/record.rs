@@ -2,6 +2,7 @@
 
 use super::energy;
 use super::limits::{Ranges, TINY_SHAPE};
+use super::missing;
 use super::options::{FitOptions, WeightMode};
 use super::part::Part;
 use super::solver::Stop;
@@ -29,8 +30,52 @@ struct Row {
     interval: LobeRecord<Option<(f64, f64)>>,
     model_error: LobeRecord<Option<f64>>,
     bootstrap: LobeRecord<Option<f64>>,
-    /// Whether a shape ended at an end of its range.
-    at_end: Shapes<bool>,
+    /// Where a shape ended at an end of its range.
+    at_end: Shapes<Option<Ended>>,
+}
+
+/// An end of a range.
+#[derive(Debug, Clone, Copy)]
+enum End {
+    Low,
+    High,
+}
+
+/// A shape that ended at an end of its range.
+#[derive(Debug, Clone, Copy)]
+struct Ended {
+    value: f64,
+    end: End,
+    /// Whether that end was asked for, else it is the end of what is searched.
+    asked: bool,
+    /// Whether the data determine it all the same.
+    determined: bool,
+    /// Whether it has an interval to one side.
+    interval: bool,
+}
+
+impl Ended {
+    /// What is told of the parameter called `name`.
+    fn warning(self, name: &str) -> String {
+        let (end, more) = match self.end {
+            End::High => ("high", "a larger one"),
+            End::Low => ("low", "a smaller one"),
+        };
+        let range = if self.asked { "was asked for" } else { "is searched" };
+        let place = format!("{name} ended at {}, the {end} end of the range that {range}", brief(self.value));
+        let wish = format!("{place}: the data ask for {more}, so there is no standard error");
+        match (self.determined, self.interval) {
+            (true, true) => format!("{wish}; an interval reaches from that end inwards"),
+            (true, false) => wish,
+            (false, _) => place,
+        }
+    }
+}
+
+/// Six digits at most, without zeros at the end.
+fn brief(x: f64) -> String {
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    if (1e-4..1e6).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
 /// Shape parameters of a lobe by name.
@@ -64,9 +109,10 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
         .options
         .bootstrap
         .map(|b| BootstrapRecord { replicates: u64::from(b.replicates), standard_error: redrawn });
-    let at_end = at_end_names(&material, &at_end);
+    let at_end = ended(&material, &at_end);
     record.undetermined = without_error(&material, &record.standard_error);
-    record.undetermined.retain(|name| !at_end.contains(name));
+    let known = |name: &String| at_end.iter().any(|(of, ended)| of == name && ended.determined);
+    record.undetermined.retain(|name| !known(name));
     record.correlation = facts.correlation(&order);
     record.energy = energy::energy(&material, facts.options.conserve_energy);
     record.warnings = facts.warnings(&material, &record, &at_end);
@@ -196,8 +242,8 @@ impl Facts<'_> {
         let dark = row.term.weight.iter().all(|w| *w == 0.0);
         let mut shape = Vec::new();
         for (own, parameter) in kind.lobe().parameters().iter().enumerate() {
-            let values: Vec<ShapeValue> =
-                self.parts.iter().map(|p| p.shape_value(l, own, &self.ranges.shapes)).collect();
+            let of_part = |p: &Part| p.shape_value(l, own, &self.ranges.shapes, parameter.bounds);
+            let values: Vec<ShapeValue> = self.parts.iter().map(of_part).collect();
             shape.push(shared(&values, |v| v.value));
             let name = || parameter.name.to_owned();
             row.error.shape.push((name(), shared(&values, |v| v.error)));
@@ -261,20 +307,12 @@ impl Facts<'_> {
         Some(Correlation { parameters, matrix })
     }
 
-    fn warnings(&self, material: &Material, record: &FitRecord, at_end: &[String]) -> Vec<String> {
+    fn warnings(&self, material: &Material, record: &FitRecord, at_end: &[(String, Ended)]) -> Vec<String> {
         let mut list = Vec::new();
         if !record.undetermined.is_empty() {
             list.push(format!("the data do not determine {}", record.undetermined.join(", ")));
         }
-        if !at_end.is_empty() {
-            list.push(format!(
-                "{} ended at the end of its range: the data ask for more than the range has, so there is no standard error; an interval \
-                 reaches from that end inwards",
-                at_end.join(", ")
-            ));
-        } else if record.status == "at-bound" {
-            list.push("a shape parameter ended at the end of its range".into());
-        }
+        list.extend(at_end.iter().map(|(name, ended)| ended.warning(name)));
         if record.status == "max-iterations" {
             list.push("the search used up its steps before it converged".into());
         }
@@ -288,6 +326,9 @@ impl Facts<'_> {
             }
         }
         let refused: usize = self.parts.iter().map(|p| p.refused).sum();
+        let whole = !self.options.use_sigma && self.parts.iter().all(|p| p.subset.is_none());
+        let valid = whole.then(|| self.parts.iter().flat_map(|p| &p.counts).sum::<usize>() + refused);
+        list.extend(missing::warnings(self.measurement, self.options, valid));
         if refused > 0 {
             list.push(format!("{refused} values are too negative for the logarithm of the loss and were left out"));
         }
@@ -301,7 +342,7 @@ impl Facts<'_> {
                 100.0 * subset.rmse_excess_95
             ));
         }
-        list.extend(Self::structure_warning(record));
+        list.extend(self.structure_warning(record));
         list.extend(self.noise_warnings(record));
         let capped: Vec<&str> = self.capped().map(|c| self.measurement.channels[c].as_str()).collect();
         if !capped.is_empty() {
@@ -364,11 +405,16 @@ impl Facts<'_> {
     }
 
     /// Says in plain words that the model can't bend as the material does.
-    fn structure_warning(record: &FitRecord) -> Option<String> {
+    fn structure_warning(&self, record: &FitRecord) -> Option<String> {
         let residual = record.residual.as_ref().filter(|r| r.structured_share > STRUCTURED)?;
+        let unit = match self.options.loss.unit(self.measurement.dimension) {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        };
         Some(format!(
-            "the model does not describe these data: {:.0} % of the residuals' variance is structure, not noise (model error {:.3e}, noise \
-             {:.1e}); the standard errors are of noise alone, `model_error` says how far the model's own error moves the parameters",
+            "the model does not describe these data: {:.0} % of the residuals' variance is structure, not noise (model error \
+             {:.3e}{unit}, noise {:.1e}{unit}); the standard errors are of noise alone, `model_error` says how far the model's own error \
+             moves the parameters",
             100.0 * residual.structured_share,
             residual.model_rmse,
             residual.noise_rmse,
@@ -387,7 +433,7 @@ struct ShapeValue {
     interval: Option<(f64, f64)>,
     model_error: Option<f64>,
     bootstrap: Option<f64>,
-    at_end: bool,
+    at_end: Option<Ended>,
 }
 
 impl Part {
@@ -395,8 +441,8 @@ impl Part {
         self.solution.weights.iter().any(|x| x[lobe] > 0.0)
     }
 
-    /// Parameter `own` of lobe `l`.
-    fn shape_value(&self, l: usize, own: usize, ranges: &[(f64, f64)]) -> ShapeValue {
+    /// Parameter `own` of lobe `l`, whose own range is `searched`.
+    fn shape_value(&self, l: usize, own: usize, ranges: &[(f64, f64)], searched: (f64, f64)) -> ShapeValue {
         let of_lobe = self.layout.iter().enumerate().filter(|(_, (lobe, _))| *lobe == l).map(|(i, _)| i);
         let Some(i) = of_lobe.clone().nth(own) else {
             return ShapeValue { value: f64::NAN, ..ShapeValue::default() };
@@ -409,24 +455,29 @@ impl Part {
             let value = if value <= 2.0 * TINY_SHAPE { 0.0 } else { ranges[i].0 };
             let nothing = Some(0.0);
             let interval = Some((value, value));
-            let at_end = false;
+            let at_end = None;
             return ShapeValue { value, error: nothing, interval, model_error: nothing, bootstrap: nothing, at_end };
         }
         // An error wider than the whole range that is searched means that the data leave the shape open.
         let error = self.uncertainty.errors[place].filter(|e| self.lit(l) && *e < high - low);
-        let at_end = self.at_end[i];
-        let known = error.is_some() || at_end;
+        let known = error.is_some() || self.at_end[i];
         let interval = self.intervals[place].filter(|_| known).map(|(low, high)| (low.exp(), high.exp()));
         let model_error = error.map(|_| self.uncertainty.structured[place] * value);
         let bootstrap = error.and(self.bootstrap.as_ref()).map(|b| b[place] * value);
-        ShapeValue {
-            value,
-            error: error.map(|e| e * value),
-            interval: finite(interval),
-            model_error,
-            bootstrap,
-            at_end,
+        let interval = finite(interval);
+        let at_end = self.ended(l, i, ranges[i], searched).map(|ended| Ended { interval: interval.is_some(), ..ended });
+        ShapeValue { value, error: error.map(|e| e * value), interval, model_error, bootstrap, at_end }
+    }
+
+    /// Where shape `i`, of lobe `l`, ended at an end of its range; `searched` is what that is where nothing is asked for.
+    fn ended(&self, l: usize, i: usize, range: (f64, f64), searched: (f64, f64)) -> Option<Ended> {
+        let (t, (low, high)) = (self.solution.t[i], self.bounds[i]);
+        if !(low < high && self.lit(l) && (t <= low || t >= high)) {
+            return None;
         }
+        let (end, value, last) =
+            if t >= high { (End::High, range.1, searched.1) } else { (End::Low, range.0, searched.0) };
+        Some(Ended { value, end, asked: value != last, determined: self.at_end[i], interval: false })
     }
 }
 
@@ -482,29 +533,35 @@ fn without_error(material: &Material, errors: &[LobeRecord<Option<f64>>]) -> Vec
         let lobe = material.lobe_name(l);
         let open = error.weight.iter().zip(&material.channels).filter(|(e, _)| e.is_none());
         names.extend(open.map(|(_, c)| format!("{lobe}.weight[{c}]")));
-        names.extend(shape_names(material, l, &error.shape, Option::is_none));
+        let open = shape_names(material, l, &error.shape, |e| e.is_none().then_some(()));
+        names.extend(open.into_iter().map(|(name, ())| name));
     }
     names
 }
 
-/// Names of the shapes that ended at an end of their range.
-fn at_end_names(material: &Material, at_end: &[Shapes<bool>]) -> Vec<String> {
-    let of_lobe = |(l, shapes)| shape_names(material, l, shapes, |ends| *ends);
+/// The shapes that ended at an end of their range, by name.
+fn ended(material: &Material, at_end: &[Shapes<Option<Ended>>]) -> Vec<(String, Ended)> {
+    let of_lobe = |(l, shapes)| shape_names(material, l, shapes, |ended: &Option<Ended>| *ended);
     at_end.iter().enumerate().flat_map(of_lobe).collect()
 }
 
-/// Names of the shapes of lobe `l` for which something holds.
-fn shape_names<T>(material: &Material, l: usize, shapes: &Shapes<T>, holds: impl Fn(&T) -> bool) -> Vec<String> {
+/// What there is to tell of the shapes of lobe `l`, by name.
+fn shape_names<T, U>(
+    material: &Material,
+    l: usize,
+    shapes: &Shapes<T>,
+    tell: impl Fn(&T) -> Option<U>,
+) -> Vec<(String, U)> {
     let lobe = material.lobe_name(l);
-    let mut names = Vec::new();
+    let mut told = Vec::new();
     for (name, value) in shapes {
         match value {
-            PerChannel::Shared(value) => names.extend(holds(value).then(|| format!("{lobe}.{name}"))),
+            PerChannel::Shared(value) => told.extend(tell(value).map(|t| (format!("{lobe}.{name}"), t))),
             PerChannel::Each(list) => {
-                let chosen = list.iter().zip(&material.channels).filter(|(value, _)| holds(value));
-                names.extend(chosen.map(|(_, c)| format!("{lobe}.{name}[{c}]")));
+                let each = list.iter().zip(&material.channels);
+                told.extend(each.filter_map(|(value, c)| tell(value).map(|t| (format!("{lobe}.{name}[{c}]"), t))));
             }
         }
     }
-    names
+    told
 }

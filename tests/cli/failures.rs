@@ -1,6 +1,6 @@
 //! Exit codes: 0 done, 1 the work failed, 2 the command line or an input is wrong.
 
-use crate::bench::{Bench, broken, fixture, nothing_to_fit};
+use crate::bench::{Bench, broken, csv, fixture, nothing_to_fit};
 
 #[test]
 fn exit_codes_tell_wrong_input_from_failed_work() {
@@ -11,9 +11,11 @@ fn exit_codes_tell_wrong_input_from_failed_work() {
     b.ok(&["render", "--size", "16", "--samples", "2", "--out", "c.exr"]);
     b.write("none.csv", nothing_to_fit());
     b.write("broken.csv", broken());
+    b.write("masked.csv", csv(&[(30.0, 10.0, 0.0, f64::NAN)]));
+    b.write("huge.csv", csv(&[(30.0, 10.0, 0.0, 1e300)]));
     b.write("cut.json", "{\"format\": \"goniofit-material\", ");
     b.write("odd.toml", "version = 1\nname = \"odd\"\ncolour = 3\n");
-    let table: [(&[&str], i32, &str); 27] = [
+    let table: [(&[&str], i32, &str); 30] = [
         (&["--no-such-option"], 2, "--no-such-option"),
         (&["fit"], 2, "FILE"),
         (&["fit", "p.csv", "--no-such-option"], 2, "--no-such-option"),
@@ -21,6 +23,9 @@ fn exit_codes_tell_wrong_input_from_failed_work() {
         (&["fit", "broken.csv"], 2, "broken.csv, after line 1"),
         (&["fit", "."], 2, "."),
         (&["fit", "none.csv"], 1, "nothing valid to fit"),
+        (&["fit", "masked.csv"], 1, "1 are masked"),
+        (&["fit", "huge.csv"], 2, "1e300"),
+        (&["fit", "p.csv", "--fix", "lambert.weight=1e300"], 1, "p.csv: the solver failed"),
         (&["fit", "p.csv", "p.csv", "--out", "x.json"], 2, "--out-dir"),
         (&["fit", "p.csv", "--out", "x.json", "--out-dir", "d"], 2, "--out-dir"),
         (&["info", "a.exr"], 2, "a.exr"),

@@ -177,7 +177,9 @@ fn fixed_parameters_stay_and_bounds_hold() {
     assert!(record["standard_error"][1]["shape"]["exponent"].is_null(), "{}", record["standard_error"]);
     assert!(record["standard_error"][1]["weight"][0].is_number(), "{}", record["standard_error"]);
     assert_eq!(record["undetermined"], json!([]));
-    assert!(record["warnings"].to_string().contains("phong.exponent ended at the end"), "{}", record["warnings"]);
+    let warned = record["warnings"].to_string();
+    assert!(warned.contains("phong.exponent ended at 60, the low end of the range that was asked for"), "{warned}");
+    assert!(warned.contains("a smaller one") && warned.contains("an interval reaches"), "{warned}");
     let ends = &record["interval_95"][1]["shape"]["exponent"];
     let (low, high) = (number(&ends[0]), number(&ends[1]));
     assert!((low / 60.0 - 1.0).abs() < 1e-12 && high > 60.0 && high < 70.0, "{low} to {high}");
@@ -333,6 +335,84 @@ fn the_model_is_chosen_on_request_and_the_comparison_shown() {
 }
 
 #[test]
+fn a_limit_concerns_the_candidates_that_have_its_lobe() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    let ran = b.ok(&["fit", "p.csv", "--model", "auto", "--fix", "phong[1].exponent=4", "--out", "a.json"]);
+    let fit = b.json_file("a.json");
+    assert_eq!(fit["model"], "lambert+phong");
+    let warned = fit["fit"]["warnings"].to_string();
+    assert!(warned.contains("phong[1].exponent=4 limits nothing: lambert+phong has no such parameter"), "{warned}");
+    assert_eq!(fit["lobes"], b.json(&["fit", "p.csv"])["lobes"]);
+    assert!(ran.text().contains("limits nothing"), "{}", ran.text());
+    let held = b.json(&["fit", "p.csv", "--model", "auto", "--fix", "phong.exponent=90"]);
+    assert_eq!(held["fit"]["limits"], json!(["phong.exponent=90"]));
+    assert_eq!(exponent(&held, 1), 90.0);
+}
+
+#[test]
+fn the_table_of_models_says_what_it_was_computed_on() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    let plain = b.ok(&["fit", "p.csv", "--model", "auto"]).text();
+    assert!(plain.contains("rmse and held out are in 1/sr\n"), "{plain}");
+    let robust = b.ok(&["fit", "p.csv", "--model", "auto", "--robust", "huber"]).text();
+    assert!(robust.contains("robust scale of the richest model"), "{robust}");
+    b.ok(&["simulate", "--material", "satin", "--scan", "hemisphere:4", "--seed", "1", "--out", "big.csv"]);
+    let big = b.ok(&["fit", "big.csv", "--model", "auto", "--out", "big.json"]).text();
+    let samples = b.json_file("big.json")["fit"]["choice"]["samples"].as_u64().expect("a count");
+    assert!(samples < 40_000 && big.contains(&format!("of {samples} samples spread over the file")), "{big}");
+}
+
+#[test]
+fn in_the_flat_world_models_are_compared_by_the_names_that_are_fitted() {
+    let b = Bench::new();
+    let file = fixture("measurements/in-plane-flat-world.csv");
+    let fit = b.json(&["fit", &file, "--model", "auto", "--bound", "phong2d.exponent=1..1e3"]);
+    assert_eq!(fit["fit"]["choice"]["chosen"], fit["model"]);
+    assert_eq!(fit["fit"]["choice"]["candidates"][2]["model"], "lambert2d+phong2d");
+    assert_eq!(fit["fit"]["limits"], json!(["phong2d.exponent=1..1000"]));
+    let text = b.ok(&["fit", &file, "--loss", "cuberoot"]).text();
+    assert!(text.contains(" rad^(-1/3), "), "{text}");
+}
+
+#[test]
+fn residuals_are_printed_with_their_unit() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    for (loss, unit) in
+        [("l2", " 1/sr,"), ("cosine-l2", " 1/sr,"), ("cuberoot", " sr^(-1/3),"), ("log", ","), ("relative", ",")]
+    {
+        let text = b.ok(&["fit", "p.csv", "--loss", loss, "--robust", "huber"]).text();
+        let behind = text.split("rmse ").nth(1).expect("an rmse").trim_start_matches(|c: char| !" ,".contains(c));
+        assert!(behind.starts_with(unit), "{loss}: {text}");
+        let beyond = text.lines().find(|l| l.contains("residuals beyond")).expect("a line");
+        assert!(beyond.contains(&format!("{} count less", unit.trim_end_matches(','))), "{loss}: {beyond}");
+    }
+}
+
+#[test]
+fn values_that_are_missing_and_channels_without_light_are_told() {
+    let b = Bench::new();
+    let rows =
+        ["30,180,10,0,0.1,0", "30,180,20,0,,-0.1", "30,180,40,0,nan,0", "30,180,85,0,nan,0", "10,180,30,0,0.2,0"];
+    b.write("m.csv", format!("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g\n{}\n", rows.join("\n")));
+    let fit = b.json(&["fit", "m.csv", "--model", "lambert"]);
+    let warned = fit["fit"]["warnings"].to_string();
+    assert!(warned.contains("2 of 8 values are missing (NaN or masked in the file)"), "{warned}");
+    assert!(warned.contains("channel g has no positive value") && !warned.contains("channel r"), "{warned}");
+}
+
+#[test]
+fn the_log_ends_with_words() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    let ran = b.ok(&["fit", "p.csv", "--log"]);
+    let last = ran.err.lines().find(|l| l.contains("stopped: ")).expect("a line");
+    assert!(!last.contains('{') && last.split_whitespace().count() > 4, "{last}");
+}
+
+#[test]
 fn what_is_printed_fits_on_a_page() {
     let b = Bench::new();
     b.paint("p.csv");
@@ -349,7 +429,7 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
     let b = Bench::new();
     b.paint("p.csv");
     b.write("plain.csv", csv(&[(30.0, 10.0, 0.0, 0.1), (30.0, 20.0, 0.0, 0.1)]));
-    let table: [(&[&str], &[&str]); 21] = [
+    let table: [(&[&str], &[&str]); 29] = [
         (&["p.csv", "--fix", "phong.exponent"], &["--fix", "NAME=VALUE"]),
         (&["p.csv", "--fix", "phong.sharpness=2"], &["--fix", "sharpness"]),
         (&["p.csv", "--bound", "phong.exponent=5..1"], &["--bound", "5..1 is empty"]),
@@ -357,6 +437,26 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
         (&["p.csv", "--bound", "ward.exponent=1..2"], &["--bound", "known are lambert"]),
         (&["p.csv", "--robust", "tukey"], &["--robust", "huber or cauchy"]),
         (&["p.csv", "--robust", "huber:0"], &["--robust", "huber"]),
+        (&["p.csv", "--robust", "huber:1e-300"], &["--robust", "1e-3 to 1e6", "1e-300"]),
+        (&["p.csv", "--robust", "cauchy:1e300"], &["--robust", "1e-3 to 1e6", "1e300"]),
+        (
+            &["p.csv", "--fix", "phong.exponent=1e9"],
+            &["--fix phong.exponent", "up to 1e8", "searched ends", "found 1e9"],
+        ),
+        (
+            &["p.csv", "--fix", "phong.exponent=50", "--bound", "phong.exponent=1..100"],
+            &["--fix phong.exponent=50 and --bound phong.exponent=1..100", "one limit a parameter"],
+        ),
+        (
+            &["missing.csv", "--bound", "lambert.weight=..1", "--bound", "lambert.weight[g]=..2"],
+            &["--bound lambert.weight=0..1 and --bound lambert.weight[g]=0..2"],
+        ),
+        (
+            &["p.csv", "--model", "auto", "--fix", "phong[3].exponent=5"],
+            &["--fix phong[3].exponent", "a lobe of the model lambert+phong+phong+phong"],
+        ),
+        (&["p.csv", "--use-sigma", "--weights", "uniform"], &["--use-sigma", "--weights", "cannot be used"]),
+        (&["p.csv", "--merl-angles", "center"], &["p.csv", "CSV", "--merl-angles"]),
         (&["p.csv", "--time-budget", "soon"], &["--time-budget", "2s"]),
         (&["p.csv", "--target-rmse-excess", "-1%"], &["--target-rmse-excess", "positive share"]),
         (&["p.csv", "--target-rmse-excess", "little"], &["--target-rmse-excess", "1%"]),
@@ -374,7 +474,7 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
         (&["p.csv", "--bound", "lambert.weight[x]=0.5.."], &["--bound lambert.weight[x]", "r, g, b"]),
         (
             &["p.csv", "--bound", "phong.exponent=1e9.."],
-            &["--bound phong.exponent", "meets 0.01..", "found 1000000000..inf"],
+            &["--bound phong.exponent", "meets 0.01..1e8, which is what is searched", "found 1e9.."],
         ),
         (
             &["p.csv", "--conserve-energy", "--bound", "lambert.weight=0.9..", "--bound", "phong.weight=0.5.."],

@@ -79,3 +79,21 @@ fn readings_that_noise_made_negative_are_told_and_counted() {
         assert_eq!(channel["negative"], 0, "a negative entry means not measured there");
     }
 }
+
+#[test]
+fn entries_not_measured_are_told_by_a_fit_to_all_and_to_a_part() {
+    let b = Bench::new();
+    b.ok(&["simulate", "--material", "satin", "--scan", "merl", "--noiseless", "--out", "m.binary"]);
+    let mut bytes = b.bytes("m.binary");
+    // At θh = 0 and the least θd both directions are near the normal: four entries of red, one of green.
+    for place in [12, 20, 28, 36, 12 + 8 * 90 * 90 * 180] {
+        bytes[place..place + 8].copy_from_slice(&(-1.0f64).to_le_bytes());
+    }
+    b.write("m.binary", bytes);
+    for more in [&[][..], &["--stride", "1", "--time-budget", "1us"], &["--per-channel"]] {
+        let fit = b.json(&[&["fit", "m.binary"], more].concat());
+        let warned = fit["fit"]["warnings"].to_string();
+        let want = format!("5 of {} values are missing", 3 * within_80_degrees(0.5));
+        assert!(warned.contains(&want), "{more:?}: {warned}");
+    }
+}

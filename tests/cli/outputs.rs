@@ -52,12 +52,65 @@ fn a_succeeding_command_replaces_the_old_file_and_leaves_nothing_else() {
 }
 
 #[test]
-fn a_file_can_be_converted_onto_itself() {
+fn an_output_never_replaces_an_input() {
     let b = Bench::new();
     b.paint("p.csv");
-    let before = b.text("p.csv");
-    b.ok(&["convert", "p.csv", "p.csv"]);
-    assert_eq!(b.text("p.csv"), before);
+    b.ok(&["fit", "p.csv", "--out", "p.json"]);
+    b.write("a.json", b.text("p.csv"));
+    b.write("s.toml", "version = 1\nmaterial = \"p.json\"\n");
+    std::fs::create_dir(b.path("v")).expect("a folder");
+    b.write("v/numbers.json", b.text("p.json"));
+    let mut refused = vec![
+        vec!["fit", "p.csv", "--out", "p.csv"],
+        vec!["fit", "p.csv", "--out", "./v/../p.csv"],
+        vec!["fit", "a.json", "--out-dir", "."],
+        vec!["fit", "p.csv", "a.json", "--out-dir", "."],
+        vec!["convert", "p.csv", "p.csv"],
+        vec!["convert", "p.json", "p.json", "--to", "csv"],
+        vec!["simulate", "--material", "p.csv", "--out", "p.csv"],
+        vec!["simulate", "--material", "satin", "--scan", "list:p.csv", "--out", "p.csv"],
+        vec!["validate", "p.csv", "v/numbers.json", "--out", "v"],
+    ];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("p.csv", b.path("link.csv")).expect("a link");
+        std::os::unix::fs::symlink("p.json", b.path("link.exr")).expect("a link");
+        refused.push(vec!["fit", "link.csv", "--out", "p.csv"]);
+        refused.push(vec!["fit", "p.csv", "--out", "link.csv"]);
+        refused.push(vec!["render", "--material", "p.json", "--out", "link.exr"]);
+        refused.push(vec!["simulate", "s.toml", "--scan", "list:p.csv", "--out", "link.csv"]);
+    }
+    let kept = ["p.csv", "p.json", "a.json", "v/numbers.json"].map(|name| (name, b.bytes(name)));
+    let before = b.list(".");
+    for args in refused {
+        let ran = b.run(&args);
+        assert_eq!(ran.code, Some(2), "{args:?}: {}", ran.err);
+        assert!(ran.err.contains("would destroy the input"), "{args:?}: {}", ran.err);
+        assert_eq!(b.list("."), before, "{args:?}");
+        assert!(kept.iter().all(|(name, bytes)| b.bytes(name) == *bytes), "{args:?}");
+    }
+    // Another fit of that name may be replaced, and what is no file can be both.
+    b.ok(&["fit", "p.csv", "--out-dir", "."]);
+    #[cfg(unix)]
+    assert!(!b.run(&["convert", "/dev/null", "/dev/null", "--to", "csv"]).err.contains("destroy"));
+}
+
+#[test]
+fn an_output_of_the_wrong_kind_is_said_before_the_work() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    std::fs::create_dir(b.path("folder")).expect("a folder");
+    for args in [
+        vec!["fit", "p.csv", "--out-dir", "p.csv"],
+        vec!["fit", "p.csv", "--out-dir", "p.csv/deeper"],
+        vec!["fit", "missing.csv", "--out", "folder"],
+        vec!["convert", "missing.csv", "folder", "--to", "csv"],
+        vec!["demo", "--out", "p.csv"],
+    ] {
+        let ran = b.run(&args);
+        assert_eq!(ran.code, Some(2), "{args:?}: {}", ran.err);
+        assert!(ran.err.contains("expected") && ran.err.contains("folder"), "{args:?}: {}", ran.err);
+    }
 }
 
 #[test]

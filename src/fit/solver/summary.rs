@@ -30,6 +30,20 @@ pub enum Stop {
     MaxIterations,
 }
 
+impl std::fmt::Display for Stop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Gradient { cosine } => write!(f, "the gradient is 0 (largest cosine {cosine:.1e})"),
+            Self::Cost { change } => write!(f, "a step would lower the cost by a share of {change:.1e} at most"),
+            Self::Step { length } => write!(f, "no step longer than a share of {length:.1e} lowers the cost"),
+            Self::Rounding { length, offset } => {
+                write!(f, "down to rounding (a step of a share of {length:.1e} is left, of the residuals {offset:.1e})")
+            }
+            Self::MaxIterations => f.write_str("the allowed number of steps was used up"),
+        }
+    }
+}
+
 /// The start, or one accepted step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Iteration {

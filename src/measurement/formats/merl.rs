@@ -41,7 +41,7 @@ pub(super) fn read(source: &Source, options: &ReadOptions) -> Result<Measurement
         .enumerate()
         .map_init(|| (None, Vec::new()), |(file, bytes), (i, piece)| read_piece(source, file, bytes, i, piece))
         .collect::<Result<_, _>>()?;
-    let grid = MerlGrid { angles: options.merl_angles };
+    let grid = MerlGrid { angles: options.merl_angles.unwrap_or_default() };
     let channels = CHANNELS.map(String::from).to_vec();
     let mut measurement = Measurement::new(source.name(), Directions::Merl(grid), channels, values);
     measurement.weights = Weights::Merl;

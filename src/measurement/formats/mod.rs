@@ -115,8 +115,8 @@ pub struct ReadOptions {
     /// Overrides what the file says of its quantity. A MERL table is the BRDF and an RGL file BRDF·cosθo by definition: the other
     /// one is refused for them.
     pub quantity: Option<Quantity>,
-    /// Where in its bin a MERL entry is read.
-    pub merl_angles: MerlAngles,
+    /// Where in its bin a MERL entry is read; the centre where this is not set. Set, it is refused for other formats.
+    pub merl_angles: Option<MerlAngles>,
 }
 
 /// What a written file could not hold; all zero when nothing was lost.
@@ -178,6 +178,13 @@ fn format_of(source: &Source, options: &ReadOptions) -> Result<Format, Measureme
 
 fn read_source(source: &Source, options: &ReadOptions) -> Result<Measurement, MeasurementError> {
     let format = format_of(source, options)?;
+    if options.merl_angles.is_some() && format != Format::Merl {
+        let reason = format!(
+            "only a MERL table has bins to read; read this one ({}) without --merl-angles",
+            format.description()
+        );
+        return Err(MeasurementError::unsupported(source.path(), reason));
+    }
     let mut measurement = match format {
         Format::Merl => merl::read(source, options),
         Format::Csv => csv::read(source, options),
