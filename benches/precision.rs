@@ -10,7 +10,7 @@ use goniofit::numeric::simd::{Kernel, Simd, exp, vectorised};
 use rayon::prelude::*;
 
 const SAMPLES: usize = 909_696;
-const BLOCK: usize = 1024;
+const BLOCK: usize = 512;
 const CHANNELS: usize = 3;
 const ROUNDS: usize = 40;
 const EXPONENT: f64 = 89.0;

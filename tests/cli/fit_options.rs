@@ -516,7 +516,8 @@ fn a_file_without_a_grid_falls_back_to_uniform_weights_and_says_so() {
     let warnings = fit["fit"]["warnings"].to_string();
     assert!(warnings.contains("grid") && warnings.contains("uniform"), "{warnings}");
     let asked = b.json(&["fit", "list.csv", "--model", "lambert", "--weights", "uniform"]);
-    assert_eq!(asked["fit"]["warnings"], serde_json::json!([]), "asked for, so nothing to say");
+    let warnings = asked["fit"]["warnings"].to_string();
+    assert!(!warnings.contains("grid"), "asked for, so nothing to say: {warnings}");
     assert_eq!(asked["lobes"], fit["lobes"]);
 }
 
