@@ -393,7 +393,7 @@ impl ChannelSums {
     /// σ_r of every value that states its σ.
     fn stated(&mut self, block: &Block, w: &[f64], data_slopes: &[f64], sigma: &[f64]) -> Vec<Option<f64>> {
         let of = |i: usize| {
-            let s = data_slopes[i] * sigma[block.index[i] as usize];
+            let s = data_slopes[i].abs() * sigma[block.index[i] as usize];
             (s.is_finite() && s > 0.0 && w[i] > 0.0).then_some(s)
         };
         let known: Vec<Option<f64>> = (0..block.len()).map(of).collect();
@@ -405,7 +405,7 @@ impl ChannelSums {
     }
 }
 
-/// |∂r/∂y| in the fit's scale, for errors in the data's own unit; empty where the measurement states none.
+/// ∂r/∂y in the fit's scale, for errors in the data's own unit; empty where the measurement states none.
 fn data_slopes(problem: &Problem<'_>, block: &Block, channel: usize, f: &[f64]) -> Vec<f64> {
     let samples = problem.samples;
     if samples.measurement.sigma.is_none() && samples.measurement.common.is_empty() {
