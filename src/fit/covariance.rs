@@ -381,8 +381,9 @@ impl ChannelSums {
             let u = measurement.common_plane(component, own);
             let trust = |i: usize| scratch.trust.get(i).copied().unwrap_or(1.0);
             let moved = |i: usize| {
-                let shift = u[block.index[i] as usize];
-                if shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * data_slopes[i] * shift } else { 0.0 }
+                // The cube root's ∂r/∂y is infinite at 0.
+                let shift = data_slopes[i] * u[block.index[i] as usize];
+                if w[i] > 0.0 && shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * shift } else { 0.0 }
             };
             let moved: Vec<f64> = (0..block.len()).map(moved).collect();
             vectorised(Projected { columns: &scratch.columns, on: &moved, into: total.as_mut_slice() });
