@@ -171,7 +171,7 @@ fn limited(problem: &Problem<'_>, at: &Solution) -> Vec<Vec<usize>> {
 }
 
 /// Which parameters are held at a value.
-fn pinned(problem: &Problem<'_>, channels: usize) -> Vec<bool> {
+pub(super) fn pinned(problem: &Problem<'_>, channels: usize) -> Vec<bool> {
     let ranges = problem.ranges[..channels].iter().flatten().chain(&problem.bounds);
     ranges.map(|(low, high)| low == high).collect()
 }
