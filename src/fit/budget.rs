@@ -57,8 +57,12 @@ pub(super) fn fit(
     let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
     loop {
         let began = Instant::now();
-        let (samples, transforms) =
-            Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 })?;
+        let gathered = Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 });
+        if thin > 1 && matches!(gathered, Err(FitError::NothingToFit { .. })) {
+            thin = next(thin).0; // what counts may be among the others
+            continue;
+        }
+        let (samples, transforms) = gathered?;
         let mut part = part::fit(&samples, transforms, model, ranges, options)?;
         let round = began.elapsed();
         if thin > 1 {

@@ -172,7 +172,7 @@ fn limited(problem: &Problem<'_>, at: &Solution, pinned: &[bool]) -> Vec<Vec<usi
 }
 
 /// Which parameters are held at a value.
-fn pinned(problem: &Problem<'_>, channels: usize) -> Vec<bool> {
+pub(super) fn pinned(problem: &Problem<'_>, channels: usize) -> Vec<bool> {
     let ranges = problem.ranges[..channels].iter().flatten().chain(&problem.bounds);
     ranges.map(|(low, high)| low == high).collect()
 }
@@ -382,8 +382,9 @@ impl ChannelSums {
             let u = measurement.common_plane(component, own);
             let trust = |i: usize| scratch.trust.get(i).copied().unwrap_or(1.0);
             let moved = |i: usize| {
-                let shift = u[block.index[i] as usize];
-                if shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * data_slopes[i] * shift } else { 0.0 }
+                // The cube root's ∂r/∂y is infinite at 0.
+                let shift = data_slopes[i] * u[block.index[i] as usize];
+                if w[i] > 0.0 && shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * shift } else { 0.0 }
             };
             let moved: Vec<f64> = (0..block.len()).map(moved).collect();
             vectorised(Projected { columns: &scratch.columns, on: &moved, into: total.as_mut_slice() });
@@ -394,7 +395,7 @@ impl ChannelSums {
     /// σ_r of every value that states its σ.
     fn stated(&mut self, block: &Block, w: &[f64], data_slopes: &[f64], sigma: &[f64]) -> Vec<Option<f64>> {
         let of = |i: usize| {
-            let s = data_slopes[i] * sigma[block.index[i] as usize];
+            let s = data_slopes[i].abs() * sigma[block.index[i] as usize];
             (s.is_finite() && s > 0.0 && w[i] > 0.0).then_some(s)
         };
         let known: Vec<Option<f64>> = (0..block.len()).map(of).collect();
@@ -406,7 +407,7 @@ impl ChannelSums {
     }
 }
 
-/// |∂r/∂y| in the fit's scale, for errors in the data's own unit; empty where the measurement states none.
+/// ∂r/∂y in the fit's scale, for errors in the data's own unit; empty where the measurement states none.
 fn data_slopes(problem: &Problem<'_>, block: &Block, channel: usize, f: &[f64]) -> Vec<f64> {
     let samples = problem.samples;
     if samples.measurement.sigma.is_none() && samples.measurement.common.is_empty() {

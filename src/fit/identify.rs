@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::covariance::Uncertainty;
+use super::covariance::{Uncertainty, pinned};
 use super::reduced::{Problem, Search, Solution, Streamed};
 use super::solver::{self, LevenbergMarquardt, SolverOptions};
 use crate::numeric::stats::chi_square_quantile;
@@ -92,7 +92,9 @@ fn mark(
     if too_few_places(problem, channels) {
         open.extend(0..uncertainty.errors.len());
     }
-    for i in open {
+    // What is held is known, whatever the data say.
+    let pinned = pinned(problem, channels);
+    for i in open.into_iter().filter(|&i| !pinned[i]) {
         uncertainty.errors[i] = None;
     }
 }

@@ -104,16 +104,18 @@ impl Loss {
         }
     }
 
-    /// |∂r/∂y| at the model's value `f`: how far an error of the measured value moves the residual. ε counts as a constant.
+    /// ∂r/∂y at the model's value `f`: how far, and which way, an error of the measured value moves the residual. ε counts as a constant.
     #[must_use]
     pub fn data_slope(self, f: f64, datum: Datum) -> f64 {
         let Datum { value: y, cos_i: c, epsilon } = datum;
         match self {
-            Self::L2 => 1.0,
-            Self::CosineL2 => c,
-            Self::Log => c / (1.0 + c * y),
-            Self::CubeRoot => c / (3.0 * (c * y).cbrt().powi(2)),
-            Self::Relative => (epsilon + y.abs() + (f - y) * y.signum()).abs() / (y.abs() + epsilon).powi(2),
+            Self::L2 => -1.0,
+            Self::CosineL2 => -c,
+            Self::Log => -c / (1.0 + c * y),
+            Self::CubeRoot => -c / (3.0 * (c * y).cbrt().powi(2)),
+            // Where y < 0 both the numerator and |y| shrink as y rises, so the sign is that of f − ε.
+            Self::Relative if y < 0.0 => (f - epsilon) / (epsilon - y).powi(2),
+            Self::Relative => -(f + epsilon) / (y + epsilon).powi(2),
         }
     }
 
@@ -319,10 +321,31 @@ mod tests {
                     let data = at(real, C::new(y, STEP)).im / STEP;
                     // The complex quotient cancels where f ≪ y.
                     let bound = 1e-9 * data.abs() + 1e-15 / (y + 1e-4);
-                    assert!((loss.data_slope(f, datum) - data.abs()).abs() < bound, "{loss:?} {f} {y}");
+                    assert!((loss.data_slope(f, datum) - data).abs() < bound, "{loss:?} {f} {y}");
                     let (r2, s2) = loss.evaluate(f, c, loss.slope(f, datum), y);
                     let size = size + loss.slope(f, datum) * y; // what cancels
                     assert!((r2 - r).abs() <= 1e-13 * size && (s2 / slope - 1.0).abs() < 1e-9, "{loss:?} {f} {y}");
+                }
+            }
+        }
+    }
+
+    /// Of y < 0, where |y| falls as y rises; the sign of `relative` then depends on the model's value.
+    #[test]
+    fn data_slopes_of_negative_values_match_complex_steps() {
+        for loss in [Loss::L2, Loss::CosineL2, Loss::Relative] {
+            for f in [1e-9, 1e-4, 1e-3, 0.2, 37.0] {
+                for (y, c) in [(-1e-6, 0.2), (-1e-3, 1.0), (-0.3, 0.9), (-12.0, 0.5)] {
+                    let datum = Datum { value: y, cos_i: c, epsilon: 1e-4 };
+                    let at = |y: C| match loss {
+                        Loss::Relative => (C::new(f, 0.0) - y) / (C::new(datum.epsilon, 0.0) - y),
+                        other => complex_residual(other, C::new(f, 0.0), y, c, datum.epsilon),
+                    };
+                    let want = at(C::new(y, STEP)).im / STEP;
+                    let got = loss.data_slope(f, datum);
+                    // The quotient's two terms cancel where f is near ε.
+                    let bound = 1e-9 * want.abs() + 1e-13 / (datum.epsilon - y);
+                    assert!((got - want).abs() <= bound, "{loss:?} {f} {y}: {got:e} {want:e}");
                 }
             }
         }

@@ -71,12 +71,7 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let model = options.model_for(measurement)?;
     let ranges = Ranges::new(&model, &measurement.channels, &options.limits)?;
     let all: Vec<usize> = (0..measurement.channels.len()).collect();
-    let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![&all] };
-    let mut parts = Vec::new();
-    for (done, group) in groups.iter().enumerate() {
-        let time = options.time_budget.map(|budget| budget::share(budget, clock.elapsed(), groups.len() - done));
-        parts.push(fit_part(measurement, &model, &ranges, options, group, time)?);
-    }
+    let parts = fit_parts(measurement, &model, &ranges, options, &all, clock)?;
     let samples = if let [part] = &parts[..] {
         part.samples
     } else if parts.iter().any(|p| p.subset.is_some()) {
@@ -92,6 +87,33 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let stop = parts.last().map_or(Stop::MaxIterations, |p| p.stop);
     let history = parts.into_iter().flat_map(|p| p.history).collect();
     Ok(Fitted { material, history, stop })
+}
+
+/// The fit of all channels together, or of each alone; one without a valid sample is dark as long as another has some.
+fn fit_parts(
+    measurement: &Measurement,
+    model: &ModelSpec,
+    ranges: &Ranges,
+    options: &FitOptions,
+    all: &[usize],
+    clock: Instant,
+) -> Result<Vec<part::Part>, FitError> {
+    let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![all] };
+    let mut found = Vec::new();
+    for (done, group) in groups.iter().enumerate() {
+        let time = options.time_budget.map(|budget| budget::share(budget, clock.elapsed(), groups.len() - done));
+        let part = fit_part(measurement, model, ranges, options, group, time);
+        if !matches!(part, Ok(_) | Err(FitError::NothingToFit { .. })) {
+            return part.map(|p| vec![p]);
+        }
+        found.push(part);
+    }
+    let lit = found.iter().flatten().next().cloned();
+    let or_dark = |(part, group): (Result<part::Part, FitError>, &&[usize])| match (part, &lit) {
+        (Err(_), Some(lit)) => Ok(lit.dark(group, ranges)),
+        (part, _) => part,
+    };
+    found.into_iter().zip(&groups).map(or_dark).collect()
 }
 
 /// The fit of channels that share their shapes, to as many samples as their time or the target asks for.

@@ -21,7 +21,7 @@ use super::structure::{self, Structure};
 use crate::brdf::{ModelSpec, Parameter};
 
 /// What one fit found; weights and costs in the samples' scale.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Part {
     /// The measurement's channels that were fitted.
     pub channels: Vec<usize>,
@@ -55,6 +55,34 @@ pub(super) struct Part {
     pub subset: Option<Subset>,
     /// Standard deviation of every parameter over redrawn data, in the uncertainty's order and scale.
     pub bootstrap: Option<Vec<f64>>,
+}
+
+impl Part {
+    /// What stands for channels without a valid sample, each fitted alone: no weight that is not demanded, nothing determined that is not
+    /// held, and shapes and scales as in this fit of another channel.
+    pub fn dark(&self, channels: &[usize], ranges: &Ranges) -> Self {
+        let mut dark = self.clone();
+        dark.channels = channels.to_vec();
+        (dark.samples, dark.counts, dark.refused) = (0, vec![0; channels.len()], 0);
+        dark.solution.cost = 0.0;
+        dark.uncertainty.errors.fill(None);
+        dark.uncertainty.structured.fill(0.0);
+        dark.intervals.fill(None);
+        for (own, &channel) in channels.iter().enumerate() {
+            for (l, &(low, high)) in ranges.weights[channel].iter().enumerate() {
+                let (weight, place) = (low / self.scale, own * self.solution.lobes.len() + l);
+                dark.solution.weights[own][l] = weight;
+                dark.uncertainty.errors[place] = (low == high).then_some(0.0);
+                dark.intervals[place] = (low == high).then_some((weight, weight));
+            }
+        }
+        dark.at_end.fill(false);
+        dark.capped.fill(false);
+        (dark.structure, dark.unjudged, dark.offset) = (None, false, None);
+        (dark.history, dark.report) = (Vec::new(), SearchReport::default());
+        (dark.subset, dark.bootstrap) = (None, None);
+        dark
+    }
 }
 
 /// Reduced cost below this share of the data's energy, or a Gram matrix of a larger condition number: sums of products have lost digits.

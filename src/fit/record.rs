@@ -147,7 +147,8 @@ impl Facts<'_> {
     }
 
     fn residual(&self) -> Option<ResidualRecord> {
-        let all = self.parts.iter().map(|p| p.structure.map(|s| (p, s))).collect::<Option<Vec<_>>>()?;
+        let lit = self.parts.iter().filter(|p| p.samples > 0);
+        let all = lit.map(|p| p.structure.map(|s| (p, s))).collect::<Option<Vec<_>>>()?;
         let total = |of: &dyn Fn(&Part, &super::structure::Structure) -> f64| -> f64 {
             let residuals: f64 = all.iter().flat_map(|(p, _)| &p.counts).map(|n| *n as f64).sum();
             let sum: f64 = all.iter().map(|(p, s)| of(p, s) * p.counts.iter().sum::<usize>() as f64).sum();

@@ -12,7 +12,7 @@ pub(super) struct Neighbours {
     square: f64,
     /// Σ (w r r′)²: the product's variance, were the residuals independent.
     variance: f64,
-    /// Pairs.
+    /// Pairs of which both count.
     count: usize,
 }
 
@@ -99,26 +99,24 @@ impl Kernel for Sum<'_> {
         if n < 2 {
             return Neighbours::default();
         }
-        // r where it counts; the weights of neighbours are as good as equal.
+        // r where it counts.
         let mut u = vec![0.0; n];
         map(self.r, self.w, &mut u, |r, w| if w > 0.0 { r } else { 0.0 });
-        let mut weight = self.pairs.to_vec();
-        weight.iter_mut().zip(self.w).for_each(|(p, w)| *p *= w);
+        // A pair weighs as much as the lighter of the two: nothing where one is masked.
+        let mut weight = vec![0.0; n - 1];
+        map(&self.w[..n - 1], &self.w[1..], &mut weight, |a, b| if a < b { a } else { b });
+        weight.iter_mut().zip(&self.pairs[1..]).for_each(|(w, p)| *w *= p);
+        let count = weight.iter().filter(|w| **w > 0.0).count();
         if !self.trust.is_empty() {
-            weight.iter_mut().zip(self.trust).for_each(|(p, t)| *p *= t);
+            weight.iter_mut().zip(&self.trust[1..]).for_each(|(w, t)| *w *= t);
         }
-        let (weight, before, after) = (&weight[1..], &u[..n - 1], &u[1..]);
+        let (weight, before, after) = (&weight[..], &u[..n - 1], &u[1..]);
         let mut product = vec![0.0; n - 1];
         map(before, after, &mut product, |a, b| a * b);
         let mut weighted = product.clone();
         weighted.iter_mut().zip(weight).for_each(|(p, w)| *p *= w);
         let square = 0.5 * (dot3(weight, before, before) + dot3(weight, after, after));
-        Neighbours {
-            product: dot(weight, &product),
-            square,
-            variance: dot(&weighted, &weighted),
-            count: dot(self.pairs, self.pairs) as usize,
-        }
+        Neighbours { product: dot(weight, &product), square, variance: dot(&weighted, &weighted), count }
     }
 }
 
@@ -185,5 +183,38 @@ mod tests {
         assert!((c.noise / (1.0f64 / 12.0).sqrt() - 1.0).abs() < 0.02, "{c:?}");
         assert!((c.model / 0.125f64.sqrt() - 1.0).abs() < 0.02, "{c:?}");
         assert!(structure(1.0, None, &Neighbours::default(), 5, 5.0).is_none());
+    }
+    /// A row of a table, so many vectors long and one more.
+    const VECTORS: usize = 3;
+    const ROW: usize = VECTORS * LANES + 1;
+
+    struct Row<'a>(&'a [f64; ROW], &'a [f64; ROW]);
+
+    impl Kernel for Row<'_> {
+        type Output = Neighbours;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Neighbours {
+            let mut sums = PairSums::default();
+            sums.add_row(simd, self.0, self.1, VECTORS);
+            sums.total()
+        }
+    }
+
+    #[test]
+    fn a_pair_with_a_masked_value_is_none_however_the_row_is_summed() {
+        let mut rng = stream(4, Purpose::Study, 9);
+        let r: [f64; ROW] = std::array::from_fn(|_| rng.random::<f64>() - 0.5);
+        let mut w: [f64; ROW] = std::array::from_fn(|_| 0.5 + rng.random::<f64>());
+        // Masked: the first, two in a row, the last.
+        [0, 7, 8, ROW - 1].iter().for_each(|&i| w[i] = 0.0);
+        let listed = Neighbours::of(&r, &[], &w, &[1.0; ROW]);
+        let folded = vectorised(Row(&r, &w));
+        // 24 pairs, less 0–1, 6–7, 7–8, 8–9 and the last.
+        assert_eq!((listed.count, folded.count), (19, 19));
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-14 * b.abs().max(folded.square);
+        assert!(near(listed.product, folded.product), "{listed:?} {folded:?}");
+        assert!(near(listed.square, folded.square), "{listed:?} {folded:?}");
+        assert!(near(listed.variance, folded.variance), "{listed:?} {folded:?}");
     }
 }

@@ -24,6 +24,59 @@ fn channel(m: &Measurement, c: usize) -> Measurement {
     }
 }
 
+/// A channel without a valid sample, first, in the middle or last, is dark and said to be; the others are as if it were not there.
+#[test]
+fn per_channel_passes_over_a_channel_that_is_wholly_masked() {
+    let model = "lambert+phong";
+    for dead in 0..3 {
+        let mut m = three_channels(&HEMISPHERE(15.0));
+        let n = m.len();
+        m.values[dead * n..(dead + 1) * n].fill(f64::NAN);
+        for o in [
+            options(model),
+            FitOptions { loss: Loss::Relative, ..options(model) },
+            FitOptions { robust: robust(RobustKind::Cauchy), ..options(model) },
+        ] {
+            let all = solved(&m, &FitOptions { per_channel: true, ..o.clone() });
+            for c in (0..3).filter(|c| *c != dead) {
+                let one = solved(&channel(&m, c), &o);
+                for (a, b) in all.lobes.iter().zip(&one.lobes) {
+                    assert_eq!(
+                        (a.weight[c], a.shape_of(c)),
+                        (b.weight[0], b.shape_of(0)),
+                        "{dead} is dark, channel {c}"
+                    );
+                }
+            }
+            let (r, name) = (record(&all), &m.channels[dead]);
+            assert!(all.lobes.iter().all(|l| l.weight[dead] == 0.0), "{all:?}");
+            let said = format!("channel {name} has no valid sample");
+            assert_eq!(r.warnings.iter().filter(|w| w.contains("has no valid sample")).collect::<Vec<_>>(), [&said]);
+            assert!(r.undetermined.contains(&format!("lambert.weight[{name}]")), "{:?}", r.undetermined);
+            assert!(r.undetermined.contains(&format!("phong.exponent[{name}]")), "{:?}", r.undetermined);
+        }
+        m.values.fill(f64::NAN);
+        let error = fit(&m, &FitOptions { per_channel: true, ..options(model) }).expect_err("nothing to fit");
+        assert!(matches!(error, FitError::NothingToFit { .. }), "{error}");
+    }
+}
+
+/// The first part of a table that is looked at may miss all samples of a channel.
+#[test]
+fn a_channel_of_one_valid_sample_is_found_wherever_the_sample_stands() {
+    let whole = three_channels(&HEMISPHERE(5.0));
+    let n = whole.len();
+    assert!(n > 20_000, "thinned out first");
+    let o = FitOptions { per_channel: true, target_rmse_excess: Some(0.05), ..options("lambert") };
+    for place in 100..103 {
+        let mut m = channel(&whole, 0);
+        m.values.iter_mut().enumerate().filter(|(i, _)| *i != place).for_each(|(_, v)| *v = f64::NAN);
+        let got = solved(&m, &o);
+        assert_eq!(record(&got).samples, 1, "{place}");
+        assert!(record(&got).warnings.iter().all(|w| !w.contains("no valid sample")), "{:?}", record(&got).warnings);
+    }
+}
+
 #[test]
 fn per_channel_is_three_fits_of_one_channel_bit_for_bit() {
     let m = three_channels(&HEMISPHERE(15.0));

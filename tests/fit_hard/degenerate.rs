@@ -1,5 +1,6 @@
 //! Data that do not determine everything: what they do determine is right, the rest is said to be open, and nothing is made up.
 
+use goniofit::fit::{FitOptions, Limit};
 use goniofit::gonio::{Instrument, Scan};
 
 use crate::support::*;
@@ -150,4 +151,20 @@ fn fewer_samples_than_parameters_are_answered_without_a_made_up_number() {
         }
     }
     assert!(failures.is_empty(), "{} cases:\n{}", failures.len(), failures.join("\n"));
+}
+
+/// Two places, one of them the peak, fix two weights whatever the exponent: all is open but what is held.
+#[test]
+fn a_held_weight_stays_known_where_the_samples_stand_at_too_few_places() {
+    let two = part_of(&HEMISPHERE(20.0), |wi, wo| {
+        [1.0, 20f64.to_radians().cos()].iter().any(|c| (cos_alpha(wi, wo) - c).abs() < 1e-9)
+    });
+    let m = measure(&material(&[0.3], &[0.2], 20.0), &Instrument::default(), &two, 3);
+    let limits = vec![Limit::fixed("phong.weight=0.2").expect("a limit")];
+    let got = solved(&m, &FitOptions { limits, ..options("lambert+phong") });
+    let open = undetermined(&got);
+    println!("{} samples, {:?} {:?} {open:?}", m.len(), parameters(&got), errors(&got));
+    assert!(!open.contains(&"phong.weight[r]".to_owned()), "{open:?}");
+    assert_eq!(errors(&got)[1], Some(0.0));
+    assert!(open.contains(&"phong.exponent".to_owned()), "{open:?}");
 }

@@ -112,6 +112,45 @@ fn standard_errors_are_those_of_the_sandwich_written_out() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
+/// Dim values with noise about them, so that a shared error moves the residuals of some up and of others down.
+fn both_signs() -> Measurement {
+    let truth = material(&[2e-3, 1e-3], &[0.1, 0.25], 35.0);
+    let mut m = exact(&truth, &HEMISPHERE(15.0));
+    let mut rng = draws(12);
+    m.values.iter_mut().for_each(|v| *v += 2e-3 * normal(&mut rng));
+    let negative = m.values.iter().filter(|v| **v < 0.0).count();
+    assert!(negative > m.values.len() / 10, "{negative} of {}", m.values.len());
+    m.common = vec![m.values.iter().map(|v| 1e-3 + 0.02 * v.abs()).collect()];
+    m
+}
+
+fn assert_errors_are_those_written_out(m: &Measurement, loss: Loss) {
+    let o = FitOptions { loss, ..options("lambert+phong") };
+    let got = solved(m, &o);
+    let (reference, p) = at(m, &o, &got);
+    let (have, want) = (errors(&got), reference.errors(m, &p));
+    let near = have.iter().zip(&want).all(|(a, b)| a.is_some_and(|a| rel(a, *b) < 1e-6));
+    assert!(near, "{}: {have:?}, written out {want:?}", loss.name());
+}
+
+#[test]
+fn a_shared_error_keeps_its_sign_on_negative_values() {
+    let m = both_signs();
+    for loss in [Loss::L2, Loss::CosineL2, Loss::Relative] {
+        assert_errors_are_those_written_out(&m, loss);
+    }
+}
+
+/// The cube root's slope is infinite at a value of 0: a shared error can't be carried through it, and must not spoil the others.
+#[test]
+fn a_shared_error_passes_over_a_value_of_0_in_the_cube_root() {
+    let mut m = two_channels(&HEMISPHERE(15.0), 1e5);
+    m.sigma = None;
+    m.values[40] = 0.0;
+    m.common = vec![m.values.iter().map(|v| 1e-3 + 0.02 * v.abs()).collect()];
+    assert_errors_are_those_written_out(&m, Loss::CubeRoot);
+}
+
 /// The written-out gradient used above is the slope of the written-out cost.
 #[test]
 fn the_written_out_gradient_is_the_slope_of_the_written_out_cost() {

@@ -157,7 +157,8 @@ impl Reference {
             a += v.w * &j * j.transpose();
             b += v.w * v.w * square * &j * j.transpose();
             for (i, g) in common.iter_mut().enumerate() {
-                *g += v.w * &j * (to * m.common_plane(i, v.channel)[v.entry]);
+                let shift = to * m.common_plane(i, v.channel)[v.entry];
+                *g += v.w * &j * if shift.is_finite() { shift } else { 0.0 };
             }
         }
         for g in common {

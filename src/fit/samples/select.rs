@@ -147,7 +147,7 @@ impl Judge<'_> {
     /// 1/σ_r² with σ_r = |∂r/∂y| σ at f = y; 0 where σ is no positive number.
     fn inverse_variance(&self, entry: usize, channel: usize, datum: Datum) -> f64 {
         let sigma = self.samples.measurement.sigma_plane(channel).map_or(f64::NAN, |s| s[entry]);
-        let sigma_r = sigma * self.samples.loss.data_slope(datum.value, datum);
+        let sigma_r = sigma * self.samples.loss.data_slope(datum.value, datum).abs();
         if sigma > 0.0 && sigma_r > 0.0 && sigma_r.is_finite() { sigma_r.powi(-2) } else { 0.0 }
     }
 }
