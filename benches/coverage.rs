@@ -33,18 +33,21 @@ fn main() {
     println!("| scan | light, e⁻ sr | fit | experiments | kd | ks | n |");
     println!("|---|---|---|---|---|---|---|");
     let mut fine = true;
-    for (index, (name, cell)) in cells().into_iter().enumerate() {
+    for (index, (name, cell, must_hold)) in cells().into_iter().enumerate() {
         let n = EXPERIMENTS / share;
         let held = held(&cell, n, EXPERIMENTS * index as u64);
         let shares = held.map(|h| h as f64 / n as f64);
-        fine &= shares.iter().all(|s| (s - 0.95).abs() <= WINDOW * widen);
+        fine &= !must_hold || shares.iter().all(|s| (s - 0.95).abs() <= WINDOW * widen);
         let [kd, ks, exponent] = shares.map(|s| format!("{:.1} %", 100.0 * s));
         println!("| {} | {:e} | {name} | {n} | {kd} | {ks} | {exponent} |", cell.scan, cell.electrons);
     }
     let n = ROUND_TRIPS / share;
     let round = round_trip(n);
-    fine &= (round - 0.95).abs() <= ROUND_TRIP_WINDOW * widen;
-    println!("\nRound trip of {n} random cases (truth, light, scan): {:.2} % of the intervals hold it.", 100.0 * round);
+    fine &= round.iter().all(|share| (share - 0.95).abs() <= ROUND_TRIP_WINDOW * widen);
+    let [kd, ks, exponent] = round.map(|share| format!("{:.2} %", 100.0 * share));
+    println!(
+        "\nRound trip of {n} random cases (truth, light, scan): {kd} of the intervals of kd hold it, {ks} of ks, {exponent} of n."
+    );
     println!("{:.0} s on {} threads.", clock.elapsed().as_secs_f64(), rayon::current_num_threads());
     if !fine {
         eprintln!("a figure leaves its window");
@@ -56,21 +59,29 @@ fn scans() -> [Scan; 2] {
     [Scan::Hemisphere { step_deg: 10.0 }, Scan::InPlane { step_deg: 5.0 }]
 }
 
-/// One-sided outliers pull a Cauchy fit by about a hundredth of the noise of one sample, so they are met in a small scan alone: with its 300
-/// samples that is a fifth of the standard error, with a hemisphere's 2,600 it would be half of it, and the intervals are of noise.
-fn cells() -> Vec<(&'static str, Cell)> {
+/// A fit's name, its experiment, and whether its intervals must hold.
+type Row = (&'static str, Cell, bool);
+
+/// One-sided outliers pull a Cauchy fit by about a hundredth of the noise of one sample: with an in-plane scan's 300 samples that is a fifth of
+/// the standard error, with a hemisphere's 2,600 half of it, and the intervals are of noise. That row is printed, for it is what to expect.
+fn cells() -> Vec<Row> {
     let mut list = Vec::new();
     for scan in scans() {
         for electrons in ELECTRONS {
-            list.push(("plain", Cell::plain(scan.clone(), electrons)));
+            list.push(("plain", Cell::plain(scan.clone(), electrons), true));
         }
     }
-    for electrons in ELECTRONS {
-        let small = Cell::plain(Scan::InPlane { step_deg: 3.0 }, electrons);
-        let cauchy = Cell { outliers: Outliers::OneSided(0.05), robust: Some(RobustKind::Cauchy), ..small.clone() };
-        list.push(("cauchy, 5 % one-sided outliers", cauchy));
-        let huber = Cell { outliers: Outliers::Symmetric(0.05), robust: Some(RobustKind::Huber), ..small };
-        list.push(("huber, 5 % symmetric outliers", huber));
+    for (scan, one_sided_holds) in
+        [(Scan::InPlane { step_deg: 3.0 }, true), (Scan::Hemisphere { step_deg: 10.0 }, false)]
+    {
+        for electrons in ELECTRONS {
+            let with = |outliers, kind| Cell { outliers, robust: Some(kind), ..Cell::plain(scan.clone(), electrons) };
+            let (one_sided, symmetric) = (Outliers::OneSided(0.05), Outliers::Symmetric(0.05));
+            let cauchy = with(one_sided, RobustKind::Cauchy);
+            list.push(("cauchy, 5 % one-sided outliers", cauchy, one_sided_holds));
+            list.push(("cauchy, 5 % symmetric outliers", with(symmetric, RobustKind::Cauchy), true));
+            list.push(("huber, 5 % symmetric outliers", with(symmetric, RobustKind::Huber), true));
+        }
     }
     list
 }
@@ -83,11 +94,11 @@ fn held(cell: &Cell, experiments: u64, first_seed: u64) -> [u64; 3] {
 }
 
 /// Share of intervals that hold the truth over random cases whose truth lies five standard errors inside every bound.
-fn round_trip(cases: u64) -> f64 {
+fn round_trip(cases: u64) -> [f64; 3] {
     let all: Vec<Option<[bool; 3]>> = (0..cases + cases / 4).into_par_iter().map(random_case).collect();
     let kept: Vec<[bool; 3]> = all.into_iter().flatten().take(cases as usize).collect();
     assert_eq!(kept.len() as u64, cases, "too few cases are clear of the bounds");
-    kept.iter().flatten().filter(|h| **h).count() as f64 / (3 * cases) as f64
+    std::array::from_fn(|i| kept.iter().filter(|held| held[i]).count() as f64 / cases as f64)
 }
 
 fn random_case(index: u64) -> Option<[bool; 3]> {
