@@ -46,7 +46,7 @@ pub(super) struct Found {
     pub report: SearchReport,
 }
 
-/// Where lobes of one problem may stand: nodes an octave apart within the bounds of each t.
+/// Where lobes of one problem may stand: nodes an octave apart within the bounds of each t, closer where a range is narrow.
 struct Nodes {
     /// All distinct t, ascending.
     t: Vec<f64>,
@@ -62,9 +62,24 @@ pub(super) fn octaves(low: f64, high: f64) -> Vec<f64> {
     (0..=count).map(|k| low + k as f64 * std::f64::consts::LN_2).collect()
 }
 
+/// Nodes of a range at least, unless its ends are one: both of them and the middle.
+const FEWEST_NODES: usize = 3;
+
+/// Nodes from `low` to `high`: octaves apart, or evenly spaced from end to end where that would be fewer than `fewest`.
+fn spaced(low: f64, high: f64, fewest: usize) -> Vec<f64> {
+    let octaves = octaves(low, high);
+    if low >= high || octaves.len() >= fewest {
+        return octaves;
+    }
+    let step = (high - low) / (fewest - 1) as f64;
+    let inner = (0..fewest - 1).map(|k| low + k as f64 * step);
+    inner.chain([high]).collect()
+}
+
 impl Nodes {
     fn new(problem: &Problem<'_>) -> Self {
-        let lists: Vec<Vec<f64>> = problem.bounds.iter().map(|(low, high)| octaves(*low, *high)).collect();
+        let fewest = problem.bounds.len().max(FEWEST_NODES);
+        let lists: Vec<Vec<f64>> = problem.bounds.iter().map(|(low, high)| spaced(*low, *high, fewest)).collect();
         let mut t: Vec<f64> = lists.iter().flatten().copied().collect();
         t.sort_by(f64::total_cmp);
         t.dedup();
@@ -74,12 +89,14 @@ impl Nodes {
     }
 
     /// The best combinations, found by adding one lobe at a time and keeping the best few; of single lobes the best `first`.
+    /// Lobes share a node only where there are fewer nodes than lobes.
     fn combinations(&self, first: usize, cost: impl Fn(&[usize]) -> f64 + Sync) -> Vec<Vec<f64>> {
         let mut beam: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
         for own in &self.of {
+            let shared = own.len() < self.of.len();
             let mut sets: Vec<Vec<usize>> = Vec::new();
             for (_, before) in &beam {
-                for &k in own.iter().filter(|k| !before.contains(k)) {
+                for &k in own.iter().filter(|k| shared || !before.contains(k)) {
                     let mut set = before.clone();
                     set.push(k);
                     if self.alike {
