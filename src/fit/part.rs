@@ -41,6 +41,8 @@ pub(super) struct Part {
     pub at_end: Vec<bool>,
     pub intervals: Intervals,
     pub saturation: Saturation,
+    /// ln(robust scale that the residuals ask for / scale used), where the two have not met.
+    pub unsettled: Option<f64>,
     pub structure: Option<Structure>,
     /// Whether noise could not be told from model error although there are residuals.
     pub unjudged: bool,
@@ -176,8 +178,9 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
         start::search_streamed(&few, &more, options.max_iterations)?
     };
     let mut solution = Streamed::new(&problem).solve(found.outcome.t.as_slice());
+    let mut unsettled = None;
     if options.robust.is_some() {
-        solution = robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
+        (solution, unsettled) = robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
         found.report = start::SearchReport::default();
     }
     let (solution, outcome) = descend(&problem, &solution, options.max_iterations, Digits::All)?;
@@ -188,7 +191,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     identify::by_passes(&part, &solution, &mut uncertainty);
     let solution = Solution { cost: uncertainty.cost, ..solution };
     let intervals = intervals::plain(&problem, &solution, &uncertainty);
-    finish(&problem, solution, uncertainty, intervals, found)
+    Ok(Part { unsettled, ..finish(&problem, solution, uncertainty, intervals, found)? })
 }
 
 /// The minimum next to a solution, on all samples, to its last digits or roughly.
@@ -267,6 +270,7 @@ fn finish(
         offset: offset::offset(problem, &solution),
         capped,
         saturation: problem.saturation,
+        unsettled: None,
         stop: found.outcome.stop,
         history: found.outcome.history,
         report: found.report,
