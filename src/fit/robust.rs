@@ -38,7 +38,7 @@ pub(super) fn settle(
     (few.saturation, more.saturation) = (saturation, saturation);
     // Outliers may have drawn the plain fit into another valley: the robust cost has the last word on where to go on.
     let other = start::search_streamed(&few, &more, steps)?;
-    let other = Streamed::new(&more).solve(other.outcome.t.as_slice());
+    let other = Streamed::new(&more).solve(other.outcome.parameters.as_slice());
     let candidates = [plain, other].map(|start| descend(&more, &start, steps, Digits::Rough));
     let [plain, other] = candidates;
     let (plain, other) = (plain?.0, other?.0);

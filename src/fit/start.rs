@@ -138,7 +138,7 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
         let smaller = problem.with_shapes(problem.layout.len() - 1);
         let found = search_with(&search.of(&smaller), steps, 0)?;
         let cost = |t: &[f64]| search.solve(t).cost;
-        starts.push(extended(problem, found.outcome.t.as_slice(), cost));
+        starts.push(extended(problem, found.outcome.parameters.as_slice(), cost));
     }
     let lattice = starts.len();
     if problem.layout.len() > 1 {
@@ -151,10 +151,10 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
         order_alike(problem, &mut best.outcome);
         // The shapes' last digits, where the cost itself no longer tells points apart.
         let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
-        let last = solver::minimize(search.walk(), lm, best.outcome.t.clone(), steps);
+        let last = solver::minimize(search.walk(), lm, best.outcome.parameters.clone(), steps);
         let last = last.map_err(|e| FitError::Solver { reason: e.to_string() })?;
         best.outcome.history.extend(last.history.into_iter().skip(1));
-        (best.outcome.t, best.outcome.cost, best.outcome.stop) = (last.t, last.cost, last.stop);
+        (best.outcome.parameters, best.outcome.cost, best.outcome.stop) = (last.parameters, last.cost, last.stop);
     }
     Ok(best)
 }
@@ -166,10 +166,10 @@ fn order_alike(problem: &Problem<'_>, outcome: &mut Outcome) {
     if !bounds || !problem.ranges.iter().all(of) {
         return;
     }
-    let mut order: Vec<usize> = (0..outcome.t.len()).collect();
-    order.sort_by(|&a, &b| outcome.t[a].total_cmp(&outcome.t[b]));
+    let mut order: Vec<usize> = (0..outcome.parameters.len()).collect();
+    order.sort_by(|&a, &b| outcome.parameters[a].total_cmp(&outcome.parameters[b]));
     let pick = |list: &[f64]| -> Vec<f64> { order.iter().map(|&i| list[i]).collect() };
-    outcome.t = DVector::from_vec(pick(outcome.t.as_slice()));
+    outcome.parameters = DVector::from_vec(pick(outcome.parameters.as_slice()));
     outcome.history.iter_mut().for_each(|step| step.parameters = pick(&step.parameters));
 }
 
