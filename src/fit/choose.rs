@@ -22,6 +22,8 @@ const FOLDS: usize = 5;
 const CELL_DEG: f64 = 10.0;
 /// Samples that the comparison looks at.
 const SAMPLES: usize = 40_000;
+/// An rmse below this share of the data's rms is rounding: of two such models neither is the better one.
+const ROUNDING: f64 = 1e-13;
 /// A held-out error within this share of the best is as good.
 const AS_GOOD: f64 = 0.01;
 
@@ -74,7 +76,7 @@ fn compare(models: &[ModelSpec], measurement: &Measurement, options: &FitOptions
         candidates.insert(0, tried);
     }
     for tried in &mut candidates {
-        tried.candidate.judge(effective.unwrap_or(measurement.len() as f64));
+        tried.candidate.judge(effective.unwrap_or(measurement.len() as f64), tried.rounding);
     }
     Ok(candidates)
 }
@@ -95,6 +97,7 @@ fn candidate(
     let thin = Thin { step: measurement.len().div_ceil(SAMPLES), run };
     let (mut cost, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
     let mut effective = Some(0.0);
+    let mut energy = 0.0;
     let (mut own, mut directions) = (Vec::new(), 0);
     for (k, group) in groups.into_iter().enumerate() {
         let (samples, _) = Samples::gather(measurement, &model, options, group, thin)?;
@@ -109,6 +112,7 @@ fn candidate(
         };
         cost += cost_on(&whole.solution, &samples);
         directions = directions.max(samples.len());
+        energy += self::energy(&samples, &whole.solution) * unit;
         residuals += samples.residuals();
         parameters += whole.uncertainty.errors.len();
         effective = effective.zip(whole.structure).map(|(sum, s)| sum + s.effective_samples);
@@ -126,6 +130,7 @@ fn candidate(
     }
     common.get_or_insert(own);
     let rms = |(cost, n): (f64, usize)| (cost / n.max(1) as f64).sqrt();
+    let rounding = ROUNDING * rms((energy, residuals));
     let candidate = ModelCandidate {
         model: options.model.to_string(),
         parameters: parameters as u64,
@@ -134,8 +139,15 @@ fn candidate(
         aicc: f64::NAN,
         bic: f64::NAN,
     };
+    let held_out = held_out.into_iter().filter(|(_, n)| *n > 0);
     let part = (thin.step > 1).then_some(directions as u64);
-    Ok(Tried { candidate, effective, folds: held_out.into_iter().map(rms).collect(), part })
+    Ok(Tried { candidate, effective, rounding, folds: held_out.map(rms).collect(), part })
+}
+
+/// Σ r² where every weight is 0, without a robust loss.
+fn energy(samples: &Samples<'_>, at: &Solution) -> f64 {
+    let nothing: Vec<_> = at.weights.iter().map(|x| x * 0.0).collect();
+    passes::sums(samples, &at.lobes, &nothing, None, Want::Gradient).iter().map(|s| s.cost).sum()
 }
 
 /// A model's errors.
@@ -143,10 +155,24 @@ struct Tried {
     candidate: ModelCandidate,
     /// How many independent samples its residuals are worth.
     effective: Option<f64>,
+    /// An rmse below this is rounding.
+    rounding: f64,
     /// Held-out rmse of every fold.
     folds: Vec<f64>,
     /// Directions looked at, where not all were.
     part: Option<u64>,
+}
+
+impl Tried {
+    /// The held-out rmse, or what rounding leaves of it.
+    fn error(&self) -> f64 {
+        let e = self.candidate.held_out_rmse;
+        if e.is_finite() { e.max(self.rounding) } else { f64::INFINITY }
+    }
+
+    fn is_exact(&self) -> bool {
+        self.error() <= self.rounding
+    }
 }
 
 /// Whether a model has the parameter that a limit is about.
@@ -165,10 +191,10 @@ fn folds(samples: &Samples<'_>) -> Vec<usize> {
 }
 
 impl ModelCandidate {
-    /// Information criteria for this many independent samples.
-    fn judge(&mut self, samples: f64) {
+    /// Information criteria for this many independent samples; an rmse below `rounding` counts as that.
+    fn judge(&mut self, samples: f64, rounding: f64) {
         let (n, k) = (samples, self.parameters as f64 + 1.0); // and the noise
-        let fit = 2.0 * n * self.rmse.ln();
+        let fit = 2.0 * n * self.rmse.max(rounding).max(f64::MIN_POSITIVE).ln();
         self.aicc = if n > k + 1.0 { fit + 2.0 * k + 2.0 * k * (k + 1.0) / (n - k - 1.0) } else { f64::INFINITY };
         self.bic = fit + k * n.ln();
     }
@@ -176,23 +202,23 @@ impl ModelCandidate {
 
 /// By how much a model's held-out error exceeds the best's, as a share, and the standard error of that over the folds.
 fn excess(own: &Tried, best: &Tried) -> (f64, f64) {
-    let least = best.candidate.held_out_rmse;
-    let pairs = own.folds.iter().zip(&best.folds).filter(|(a, b)| **a > 0.0 || **b > 0.0);
+    let least = best.error();
+    if own.error() <= least {
+        return (0.0, 0.0);
+    }
+    let floored = |list: &[f64]| -> Vec<f64> { list.iter().map(|e| e.max(best.rounding)).collect() };
+    let pairs = floored(&own.folds).into_iter().zip(floored(&best.folds));
     let differences: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n;
     let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    (own.candidate.held_out_rmse / least - 1.0, (variance / n).sqrt() / least)
+    (own.error() / least - 1.0, (variance / n).sqrt() / least)
 }
 
 /// The simplest candidate that is as good as the best, and why.
 fn choose(tried: &[Tried]) -> ModelChoice {
-    let error = |t: &&Tried| {
-        let e = t.candidate.held_out_rmse;
-        if e.is_finite() { e } else { f64::INFINITY }
-    };
     let candidates: Vec<ModelCandidate> = tried.iter().map(|t| t.candidate.clone()).collect();
-    let Some(best) = tried.iter().min_by(|a, b| error(a).total_cmp(&error(b))) else {
+    let Some(best) = tried.iter().min_by(|a, b| a.error().total_cmp(&b.error())) else {
         return ModelChoice { chosen: String::new(), reason: String::new(), candidates, samples: None };
     };
     let good = |t: &&Tried| {
@@ -200,22 +226,65 @@ fn choose(tried: &[Tried]) -> ModelChoice {
         excess <= AS_GOOD.max(error)
     };
     let chosen = tried.iter().filter(good).min_by_key(|t| t.candidate.parameters).unwrap_or(best);
+    let mut reason = why(chosen, best);
     let simpler = tried.iter().filter(|t| t.candidate.parameters < chosen.candidate.parameters);
-    let next = simpler.map(|t| error(&t)).min_by(f64::total_cmp);
-    let own = error(&chosen);
-    let mut reason = if chosen.candidate.model == best.candidate.model {
-        "the lowest held-out error".to_owned()
-    } else {
-        let (excess, error) = excess(chosen, best);
-        format!(
-            "the simplest model as good as the best one held out, {}, whose error is {:.2} % lower (within {:.2} % counts as good)",
-            best.candidate.model,
-            100.0 * excess / (1.0 + excess),
-            100.0 * AS_GOOD.max(error)
-        )
-    };
-    if let Some(next) = next {
-        let _ = write!(reason, "; the best simpler model's is {:.1} % higher", 100.0 * (next / own - 1.0));
+    if let Some(next) = simpler.map(Tried::error).min_by(f64::total_cmp) {
+        let _ = write!(reason, "; the best simpler model's is {}", higher(next / chosen.error()));
     }
     ModelChoice { chosen: chosen.candidate.model.clone(), reason, candidates, samples: best.part }
+}
+
+/// Why `chosen` and not `best`.
+fn why(chosen: &Tried, best: &Tried) -> String {
+    if chosen.is_exact() {
+        return "the simplest model whose held-out error is no more than rounding".into();
+    }
+    if chosen.candidate.model == best.candidate.model {
+        return "the lowest held-out error".into();
+    }
+    let (excess, error) = excess(chosen, best);
+    format!(
+        "the simplest model as good as the best one held out, {}, whose error is {:.2} % lower (within {:.2} % counts as good)",
+        best.candidate.model,
+        100.0 * excess / (1.0 + excess),
+        100.0 * AS_GOOD.max(error)
+    )
+}
+
+/// A ratio in words.
+fn higher(ratio: f64) -> String {
+    match ratio {
+        r if r >= 1e6 => format!("{r:.0e} times as high"),
+        r if r > 10.0 => format!("{r:.0} times as high"),
+        r => format!("{:.1} % higher", 100.0 * (r - 1.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tried(model: &str, parameters: u64, held_out_rmse: f64) -> Tried {
+        let model = model.into();
+        let (aicc, bic) = (0.0, 0.0);
+        let candidate = ModelCandidate { model, parameters, rmse: held_out_rmse, held_out_rmse, aicc, bic };
+        Tried { candidate, effective: None, rounding: 1e-13, folds: vec![held_out_rmse; FOLDS], part: None }
+    }
+
+    #[test]
+    fn errors_below_rounding_are_equal_and_large_ratios_are_said_as_multiples() {
+        let choice = choose(&[tried("a", 1, 0.1), tried("b", 2, 3e-16), tried("c", 3, 0.0)]);
+        assert_eq!(choice.chosen, "b");
+        assert!(choice.reason.contains("no more than rounding"), "{}", choice.reason);
+        assert!(choice.reason.ends_with("1e12 times as high"), "{}", choice.reason);
+        let choice = choose(&[tried("a", 1, 0.1), tried("b", 2, 0.002), tried("c", 3, 0.001)]);
+        assert_eq!((choice.chosen.as_str(), higher(1.5).as_str()), ("c", "50.0 % higher"));
+        assert!(choice.reason.ends_with("the best simpler model's is 100.0 % higher"), "{}", choice.reason);
+    }
+
+    #[test]
+    fn of_models_that_are_all_without_error_the_simplest_is_chosen() {
+        let without = |model, parameters| Tried { rounding: 0.0, ..tried(model, parameters, 0.0) };
+        assert_eq!(choose(&[without("a", 1), without("b", 2)]).chosen, "a");
+    }
 }

@@ -60,7 +60,7 @@ pub(super) fn polish(
     let lm = LevenbergMarquardt::new(options).with_bounds(ranges);
     let p = start.weights.iter().flat_map(|x| x.iter().copied()).chain(start.t.iter().copied());
     let found = solver::minimize(&joint, lm, DVector::from_iterator(parameters, p), steps);
-    Some(found.map(|outcome| (joint.solution(&outcome.t, outcome.cost), outcome)))
+    Some(found.map(|outcome| (joint.solution(&outcome.parameters, outcome.cost), outcome)))
 }
 
 impl Joint<'_> {

@@ -41,6 +41,8 @@ pub(super) struct Part {
     pub at_end: Vec<bool>,
     pub intervals: Intervals,
     pub saturation: Saturation,
+    /// ln(robust scale that the residuals ask for / scale used), where the two have not met.
+    pub unsettled: Option<f64>,
     pub structure: Option<Structure>,
     /// Whether noise could not be told from model error although there are residuals.
     pub unjudged: bool,
@@ -129,7 +131,7 @@ pub(super) fn refit(
         let start = DVector::from_column_slice(&like.solution.t);
         let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
         let found = solver::minimize(search.walk(), lm, start, options.max_iterations).map_err(failed)?;
-        return Ok(search.solve(found.t.as_slice()));
+        return Ok(search.solve(found.parameters.as_slice()));
     }
     Ok(descend_shapes(&problem, &like.solution, options.max_iterations)?.0)
 }
@@ -137,7 +139,7 @@ pub(super) fn refit(
 /// A loss that is linear in the weights, without outliers: everything from the transforms, last digits from true residuals.
 fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Part, FitError> {
     let found = start::search(search, options.max_iterations)?;
-    let mut solution = search.solve(found.outcome.t.as_slice());
+    let mut solution = search.solve(found.outcome.parameters.as_slice());
     let energy: f64 = search.energy.iter().sum();
     if solution.cost < LOST_COST * energy || condition(search, &solution) > LOST_CONDITION {
         solution = last_digits(search, solution, options)?;
@@ -203,9 +205,11 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     } else {
         start::search_streamed(&few, &more, options.max_iterations)?
     };
-    let mut solution = Streamed::new(&problem).solve(found.outcome.t.as_slice());
+    let mut solution = Streamed::new(&problem).solve(found.outcome.parameters.as_slice());
+    let mut unsettled = None;
     if options.robust.is_some() {
-        solution = robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
+        (solution, unsettled) =
+            robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
         found.report = start::SearchReport::default();
     }
     let (solution, outcome) = descend(&problem, &solution, options.max_iterations, Digits::All)?;
@@ -216,7 +220,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     identify::by_passes(&part, &solution, &mut uncertainty);
     let solution = Solution { cost: uncertainty.cost, ..solution };
     let intervals = intervals::plain(&problem, &solution, &uncertainty);
-    finish(&problem, solution, uncertainty, intervals, found)
+    Ok(Part { unsettled, ..finish(&problem, solution, uncertainty, intervals, found)? })
 }
 
 /// The minimum next to a solution, on all samples, to its last digits or roughly.
@@ -229,7 +233,7 @@ pub(super) fn descend(
     if let Some(found) = joint::polish(problem, start, steps, digits) {
         let (solution, mut outcome) = found.map_err(failed)?;
         // The history is of the shapes.
-        let weights = outcome.t.len() - problem.layout.len();
+        let weights = outcome.parameters.len() - problem.layout.len();
         outcome.history.iter_mut().for_each(|step| drop(step.parameters.drain(..weights)));
         return Ok((solution, outcome));
     }
@@ -245,7 +249,7 @@ fn descend_shapes(
     let streamed = Streamed::from(problem, start.clone());
     let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
     let outcome = solver::minimize(&streamed, lm, DVector::from_column_slice(&start.t), steps).map_err(failed)?;
-    Ok((streamed.solve(outcome.t.as_slice()), outcome))
+    Ok((streamed.solve(outcome.parameters.as_slice()), outcome))
 }
 
 #[allow(clippy::needless_pass_by_value)] // as map_err hands it over
@@ -295,6 +299,7 @@ fn finish(
         offset: offset::offset(problem, &solution),
         capped,
         saturation: problem.saturation,
+        unsettled: None,
         stop: found.outcome.stop,
         history: found.outcome.history,
         report: found.report,

@@ -395,6 +395,9 @@ impl Facts<'_> {
                 residual.noise_rmse / record.rmse
             ));
         }
+        if let Some(left) = self.parts.iter().filter_map(|p| p.unsettled).max_by(|a, b| a.abs().total_cmp(&b.abs())) {
+            list.push(unsettled_warning(left));
+        }
         if self.parts.iter().any(|p| p.unjudged) {
             list.push(
                 "whether the residuals are noise or model error can't be told: among the samples that were used too few are \
@@ -421,6 +424,15 @@ impl Facts<'_> {
             residual.noise_rmse,
         ))
     }
+}
+
+/// The robust scale and the parameters have not met: ln(scale asked for / scale used) is `left`.
+fn unsettled_warning(left: f64) -> String {
+    format!(
+        "the robust scale has not settled: the residuals ask for one that differs by {:.1e} % from the one that was used, and the \
+         parameters are those of the latter",
+        100.0 * left.exp_m1().abs()
+    )
 }
 
 /// Residuals below this share of the stated σ are worth a word.

@@ -18,52 +18,56 @@ const ROUNDS: usize = 60;
 const SETTLED: f64 = 1e-12;
 const SETTLED_LARGE: f64 = 1e-7;
 const SETTLED_PART: f64 = 1e-3;
+/// Relative change beyond which s counts as not settled where the rounds ran out: far below what the parameters' errors tell apart.
+const UNSETTLED: f64 = 1e-6;
 /// Most that s shrinks in a round: the parameters must be able to follow.
 const SHRINK: f64 = 0.25;
 
-/// The parameters at the s that their residuals ask for, starting from the plain loss's fit; sets the problem's s. `parts` are the
-/// same problem on thinned-out samples, for the search for other starts.
+/// The parameters at the s that their residuals ask for, starting from the plain loss's fit; sets the problem's s. With them, where the
+/// rounds ran out, ln(the s asked for / s). `parts` are the same problem on thinned-out samples, for the search for other starts.
 pub(super) fn settle(
     problem: &mut Problem<'_>,
     parts: (Problem<'_>, Problem<'_>),
     plain: Solution,
     options: &FitOptions,
-) -> Result<Solution, FitError> {
-    let Some(robust) = options.robust else { return Ok(plain) };
+) -> Result<(Solution, Option<f64>), FitError> {
+    let Some(robust) = options.robust else { return Ok((plain, None)) };
     let steps = options.max_iterations;
     let (mut few, mut more) = parts;
     let saturation = Some((robust.kind, robust.scale * spread(&more, &plain)));
     (few.saturation, more.saturation) = (saturation, saturation);
     // Outliers may have drawn the plain fit into another valley: the robust cost has the last word on where to go on.
     let other = start::search_streamed(&few, &more, steps)?;
-    let other = Streamed::new(&more).solve(other.outcome.t.as_slice());
+    let other = Streamed::new(&more).solve(other.outcome.parameters.as_slice());
     let candidates = [plain, other].map(|start| descend(&more, &start, steps, Digits::Rough));
     let [plain, other] = candidates;
     let (plain, other) = (plain?.0, other?.0);
     let at = if other.cost < plain.cost { other } else { plain };
     let whole = more.samples.len() == problem.samples.len();
-    let at = if whole { at } else { follow(&mut more, at, robust, steps, SETTLED_PART)? };
+    let at = if whole { at } else { follow(&mut more, at, robust, steps, SETTLED_PART)?.0 };
     let small = problem.samples.residuals() <= SMALL;
     problem.saturation = more.saturation;
     follow(problem, at, robust, steps, if small { SETTLED } else { SETTLED_LARGE })
 }
 
-/// Brings ln(new s) − ln(old s) to 0 by secants, within the bracket that is known; the parameters follow.
+/// Brings ln(new s) − ln(old s) to 0 by secants, within the bracket that is known; the parameters follow. Says what is
+/// left of it after [`ROUNDS`], where that is worth a word.
 fn follow(
     problem: &mut Problem<'_>,
     start: Solution,
     robust: Robust,
     steps: u64,
     settled: f64,
-) -> Result<Solution, FitError> {
+) -> Result<(Solution, Option<f64>), FitError> {
+    let asked = |problem: &Problem<'_>, at: &Solution| (robust.scale * spread(problem, at)).ln();
     let mut at = start;
     let mut s = problem.saturation.map_or(1.0, |(_, s)| s);
     let (mut last, mut bracket): (Option<(f64, f64)>, (f64, f64)) = (None, (f64::NEG_INFINITY, f64::INFINITY));
     for _ in 0..ROUNDS {
-        let (here, wanted) = (s.ln(), (robust.scale * spread(problem, &at)).ln());
+        let (here, wanted) = (s.ln(), asked(problem, &at));
         let excess = wanted - here;
         if excess.abs() <= settled {
-            break;
+            return Ok((at, None));
         }
         if bracket.1 - bracket.0 < 1e-3 * excess.abs() {
             // The parameters jumped: what was known of the bracket no longer holds.
@@ -82,7 +86,8 @@ fn follow(
         let digits = if settled <= SETTLED { Digits::All } else { Digits::Rough };
         at = descend(problem, &at, steps, digits)?.0;
     }
-    Ok(at)
+    let left = asked(problem, &at) - s.ln();
+    Ok((at, Some(left).filter(|left| left.abs() > UNSETTLED)))
 }
 
 /// σ of the residuals by their median absolute deviation from their median; at least rounding's share of the data.

@@ -46,7 +46,7 @@ pub(super) struct Found {
     pub report: SearchReport,
 }
 
-/// Where lobes of one problem may stand: nodes an octave apart within the bounds of each t.
+/// Where lobes of one problem may stand: nodes an octave apart within the bounds of each t, closer where a range is narrow.
 struct Nodes {
     /// All distinct t, ascending.
     t: Vec<f64>,
@@ -62,9 +62,24 @@ pub(super) fn octaves(low: f64, high: f64) -> Vec<f64> {
     (0..=count).map(|k| low + k as f64 * std::f64::consts::LN_2).collect()
 }
 
+/// Nodes of a range at least, unless its ends are one: both of them and the middle.
+const FEWEST_NODES: usize = 3;
+
+/// Nodes from `low` to `high`: octaves apart, or evenly spaced from end to end where that would be fewer than `fewest`.
+fn spaced(low: f64, high: f64, fewest: usize) -> Vec<f64> {
+    let octaves = octaves(low, high);
+    if low >= high || octaves.len() >= fewest {
+        return octaves;
+    }
+    let step = (high - low) / (fewest - 1) as f64;
+    let inner = (0..fewest - 1).map(|k| low + k as f64 * step);
+    inner.chain([high]).collect()
+}
+
 impl Nodes {
     fn new(problem: &Problem<'_>) -> Self {
-        let lists: Vec<Vec<f64>> = problem.bounds.iter().map(|(low, high)| octaves(*low, *high)).collect();
+        let fewest = problem.bounds.len().max(FEWEST_NODES);
+        let lists: Vec<Vec<f64>> = problem.bounds.iter().map(|(low, high)| spaced(*low, *high, fewest)).collect();
         let mut t: Vec<f64> = lists.iter().flatten().copied().collect();
         t.sort_by(f64::total_cmp);
         t.dedup();
@@ -74,12 +89,14 @@ impl Nodes {
     }
 
     /// The best combinations, found by adding one lobe at a time and keeping the best few; of single lobes the best `first`.
+    /// Lobes share a node only where there are fewer nodes than lobes.
     fn combinations(&self, first: usize, cost: impl Fn(&[usize]) -> f64 + Sync) -> Vec<Vec<f64>> {
         let mut beam: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
         for own in &self.of {
+            let shared = own.len() < self.of.len();
             let mut sets: Vec<Vec<usize>> = Vec::new();
             for (_, before) in &beam {
-                for &k in own.iter().filter(|k| !before.contains(k)) {
+                for &k in own.iter().filter(|k| shared || !before.contains(k)) {
                     let mut set = before.clone();
                     set.push(k);
                     if self.alike {
@@ -121,7 +138,7 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
         let smaller = problem.with_shapes(problem.layout.len() - 1);
         let found = search_with(&search.of(&smaller), steps, 0)?;
         let cost = |t: &[f64]| search.solve(t).cost;
-        starts.push(extended(problem, found.outcome.t.as_slice(), cost));
+        starts.push(extended(problem, found.outcome.parameters.as_slice(), cost));
     }
     let lattice = starts.len();
     if problem.layout.len() > 1 {
@@ -134,10 +151,10 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
         order_alike(problem, &mut best.outcome);
         // The shapes' last digits, where the cost itself no longer tells points apart.
         let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
-        let last = solver::minimize(search.walk(), lm, best.outcome.t.clone(), steps);
+        let last = solver::minimize(search.walk(), lm, best.outcome.parameters.clone(), steps);
         let last = last.map_err(|e| FitError::Solver { reason: e.to_string() })?;
         best.outcome.history.extend(last.history.into_iter().skip(1));
-        (best.outcome.t, best.outcome.cost, best.outcome.stop) = (last.t, last.cost, last.stop);
+        (best.outcome.parameters, best.outcome.cost, best.outcome.stop) = (last.parameters, last.cost, last.stop);
     }
     Ok(best)
 }
@@ -149,10 +166,10 @@ fn order_alike(problem: &Problem<'_>, outcome: &mut Outcome) {
     if !bounds || !problem.ranges.iter().all(of) {
         return;
     }
-    let mut order: Vec<usize> = (0..outcome.t.len()).collect();
-    order.sort_by(|&a, &b| outcome.t[a].total_cmp(&outcome.t[b]));
+    let mut order: Vec<usize> = (0..outcome.parameters.len()).collect();
+    order.sort_by(|&a, &b| outcome.parameters[a].total_cmp(&outcome.parameters[b]));
     let pick = |list: &[f64]| -> Vec<f64> { order.iter().map(|&i| list[i]).collect() };
-    outcome.t = DVector::from_vec(pick(outcome.t.as_slice()));
+    outcome.parameters = DVector::from_vec(pick(outcome.parameters.as_slice()));
     outcome.history.iter_mut().for_each(|step| step.parameters = pick(&step.parameters));
 }
 

@@ -492,3 +492,20 @@ fn the_simplest_model_that_describes_the_data_is_chosen() {
         }
     }
 }
+
+/// Where several models are exact only rounding tells them apart, and it has no say.
+#[test]
+fn of_models_that_describe_exact_data_the_simplest_is_chosen() {
+    for (truth, want) in [
+        (material(&[0.4], &[0.0], 10.0), "lambert"),
+        (material(&[0.4, 0.2, 0.1], &[0.0; 3], 10.0), "lambert"),
+        (material(&[0.3], &[0.2], 40.0), "lambert+phong"),
+    ] {
+        let m = exact(&truth, &HEMISPHERE(18.0));
+        let got = fit_best_model(&m, &options("lambert")).unwrap_or_else(|e| panic!("{e}")).material;
+        let choice = record(&got).choice.as_ref().expect("a choice");
+        println!("{want}: {}", choice.reason);
+        assert_eq!(choice.chosen, want, "{choice:?}");
+        assert!(choice.reason.contains("rounding") && !choice.reason.contains('%'), "{}", choice.reason);
+    }
+}

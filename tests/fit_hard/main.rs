@@ -9,6 +9,7 @@ mod degenerate;
 mod experiment;
 mod hard;
 mod invariance;
+mod narrow;
 mod optimum;
 mod properties;
 mod recovery;

@@ -75,35 +75,23 @@ pub fn solve<P: LeastSquares>(
     start: DVector<f64>,
     options: &SolverOptions,
 ) -> Result<Solution, SolveError> {
-    options.validate()?;
-    let bounds = checked_bounds(problem, &start)?;
+    let bounds = problem.bounds().unwrap_or_default();
     let adapter = Adapter::new(problem);
     let solver = LevenbergMarquardt::new(options.clone()).with_bounds(bounds.clone());
     let outcome = minimize(&adapter, solver, start, options.max_iterations)?;
     adapter.solution(outcome, &bounds, options)
 }
 
-fn checked_bounds<P: LeastSquares>(problem: &P, start: &DVector<f64>) -> Result<Vec<(f64, f64)>, SolveError> {
-    if let Some((index, &value)) = start.iter().enumerate().find(|(_, x)| !x.is_finite()) {
-        return Err(SolveError::Start { index, value });
-    }
-    let bounds = problem.bounds().unwrap_or_default();
-    if !bounds.is_empty() && bounds.len() != start.len() {
-        return Err(SolveError::BoundsCount { found: bounds.len(), expected: start.len() });
-    }
-    match bounds.iter().enumerate().find(|(_, (low, high))| low.is_nan() || high.is_nan() || low > high) {
-        Some((index, &(low, high))) => Err(SolveError::Bounds { index, low, high }),
-        None => Ok(bounds),
-    }
-}
-
-/// A [`LeastSquares`] problem as the solver sees it. The last residuals are kept, for an accepted trial is linearised where it was tried.
-struct Adapter<'a, P> {
+/// A [`LeastSquares`] problem as the solver sees it, for argmin's executor (an example is in the [module's documentation](super)). The
+/// problem's bounds are not part of it: the solver has them from [`LevenbergMarquardt::with_bounds`]. The last residuals are kept, for an
+/// accepted trial is linearised where it was tried.
+#[derive(Debug)]
+pub struct Adapter<'a, P> {
     problem: &'a P,
     seen: RefCell<Seen>,
 }
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Seen {
     last: Option<(DVector<f64>, DVector<f64>)>,
     count: Option<usize>,
@@ -112,7 +100,9 @@ struct Seen {
 }
 
 impl<'a, P: LeastSquares> Adapter<'a, P> {
-    fn new(problem: &'a P) -> Self {
+    /// A view of `problem` that has not been evaluated yet.
+    #[must_use]
+    pub fn new(problem: &'a P) -> Self {
         Self { problem, seen: RefCell::default() }
     }
 
@@ -154,7 +144,7 @@ impl<'a, P: LeastSquares> Adapter<'a, P> {
         bounds: &[(f64, f64)],
         options: &SolverOptions,
     ) -> Result<Solution, SolveError> {
-        let p = outcome.t;
+        let p = outcome.parameters;
         let r = self.residuals(&p)?;
         let j = self.jacobian(&p, r.len())?;
         let seen = self.seen.into_inner();

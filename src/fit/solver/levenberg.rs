@@ -3,6 +3,7 @@
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason};
 use nalgebra::DVector;
 
+use super::error::SolveError;
 use super::linearize::Linearize;
 use super::local::{Bounds, Local, Step, relative_length};
 use super::options::SolverOptions;
@@ -63,6 +64,27 @@ impl LevenbergMarquardt {
     pub fn with_bounds(mut self, bounds: Vec<(f64, f64)>) -> Self {
         self.bounds = Bounds(bounds);
         self
+    }
+
+    /// Why the last run stopped; `None` before one, during one, and where the executor ended it (its limit of iterations, say).
+    #[must_use]
+    pub fn stop(&self) -> Option<Stop> {
+        self.stop
+    }
+
+    /// The start of the last run and every step it accepted.
+    #[must_use]
+    pub fn history(&self) -> &[Iteration] {
+        &self.history
+    }
+
+    /// Whether options, bounds and start can be used.
+    pub(super) fn check(&self, start: &DVector<f64>) -> Result<(), SolveError> {
+        self.options.validate()?;
+        if let Some((index, &value)) = start.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            return Err(SolveError::Start { index, value });
+        }
+        self.bounds.check(start.len())
     }
 
     /// The last accepted point, why it is the last, and how it was reached.
@@ -237,6 +259,7 @@ impl<O: Linearize> Solver<O, LmState> for LevenbergMarquardt {
 
     fn init(&mut self, problem: &mut Problem<O>, mut state: LmState) -> Result<(LmState, Option<KV>), Error> {
         let start = state.take_param().ok_or_else(|| Error::msg("Levenberg-Marquardt needs a start"))?;
+        self.check(&start)?;
         let p = self.bounds.project(&start);
         let at = problem.problem("linearize_count", |o| o.linearize(&p))?;
         if !at.is_finite() {
@@ -251,6 +274,7 @@ impl<O: Linearize> Solver<O, LmState> for LevenbergMarquardt {
         self.scale = here.lengths.map(|l| if l > 0.0 { l } else { 1.0 });
         let length = here.p.component_mul(&self.scale).norm();
         self.radius = Radius(self.options.radius * if length > 0.0 { length } else { 1.0 });
+        (self.stop, self.polish, self.rejected) = (None, None, 0);
         self.history.clear();
         self.record(&here, 0.0, 0.0, 0.0);
         self.here = Some(here);

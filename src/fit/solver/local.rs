@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::error::SolveError;
 use super::linearize::Linearization;
 use super::qr::PivotedQr;
 use crate::numeric::float::larger;
@@ -13,6 +14,18 @@ pub(super) struct Bounds(pub Vec<(f64, f64)>);
 impl Bounds {
     pub fn of(&self, i: usize) -> (f64, f64) {
         self.0.get(i).copied().unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+    }
+
+    /// Whether there are as many as parameters, or none at all, and each has its ends in order.
+    pub fn check(&self, parameters: usize) -> Result<(), SolveError> {
+        let bounds = &self.0;
+        if !bounds.is_empty() && bounds.len() != parameters {
+            return Err(SolveError::BoundsCount { found: bounds.len(), expected: parameters });
+        }
+        match bounds.iter().enumerate().find(|(_, (low, high))| low.is_nan() || high.is_nan() || low > high) {
+            Some((index, &(low, high))) => Err(SolveError::Bounds { index, low, high }),
+            None => Ok(()),
+        }
     }
 
     /// The point of the box that is nearest to `p`, parameter by parameter.

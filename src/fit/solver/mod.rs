@@ -38,6 +38,49 @@
 //! # assert!((fit.parameters[0] - 2.0).abs() < 0.1 && (fit.parameters[1] - 0.5).abs() < 0.05);
 //! # Ok::<(), goniofit::fit::solver::SolveError>(())
 //! ```
+//!
+//! With an [`Adapter`] argmin's own executor runs the same problem, with its observers, timers and limits:
+//!
+//! ```
+//! use argmin::core::observers::{Observe, ObserverMode};
+//! use argmin::core::{Executor, IterState, KV, State};
+//! use goniofit::fit::solver::{Adapter, Error, LeastSquares, LevenbergMarquardt};
+//! use nalgebra::{DMatrix, DVector};
+//!
+//! struct Rosenbrock;
+//!
+//! impl LeastSquares for Rosenbrock {
+//!     fn residuals(&self, p: &DVector<f64>) -> Result<DVector<f64>, Error> {
+//!         Ok(DVector::from_vec(vec![10.0 * (p[1] - p[0] * p[0]), 1.0 - p[0]]))
+//!     }
+//!
+//!     fn jacobian(&self, p: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
+//!         Ok(DMatrix::from_row_slice(2, 2, &[-20.0 * p[0], 10.0, -1.0, 0.0]))
+//!     }
+//! }
+//!
+//! type LmState = IterState<DVector<f64>, (), (), (), (), f64>;
+//!
+//! struct Print;
+//!
+//! impl Observe<LmState> for Print {
+//!     fn observe_iter(&mut self, state: &LmState, _: &KV) -> Result<(), Error> {
+//!         println!("{}: {:e}", state.get_iter(), state.get_cost());
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let start = DVector::from_vec(vec![-1.2, 1.0]);
+//! let solver = LevenbergMarquardt::bounded(vec![(-2.0, 0.5), (-2.0, 2.0)]);
+//! let result = Executor::new(Adapter::new(&Rosenbrock), solver)
+//!     .configure(|state: LmState| state.param(start).max_iters(200))
+//!     .add_observer(Print, ObserverMode::Always)
+//!     .run()?;
+//! println!("{:?} after {} steps", result.solver.stop(), result.solver.history().len() - 1);
+//! let best = result.state().get_best_param().expect("a step was accepted");
+//! assert!(result.solver.stop().is_some() && best[0] == 0.5 && (best[1] - 0.25).abs() < 1e-9);
+//! # Ok::<(), Error>(())
+//! ```
 
 mod error;
 mod least_squares;
@@ -57,7 +100,7 @@ use nalgebra::DVector;
 
 pub use argmin::core::Error;
 pub use error::SolveError;
-pub use least_squares::{LeastSquares, Solution, solve};
+pub use least_squares::{Adapter, LeastSquares, Solution, solve};
 pub use levenberg::LevenbergMarquardt;
 pub use linearize::{Linearization, Linearize};
 pub use options::SolverOptions;
@@ -67,7 +110,7 @@ pub use summary::{Iteration, Stop};
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The parameters.
-    pub t: DVector<f64>,
+    pub parameters: DVector<f64>,
     /// Σ r² there.
     pub cost: f64,
     /// Why it ended.
@@ -79,21 +122,22 @@ pub struct Outcome {
 /// Runs the solver from `start` for at most `max_iterations` steps. With no parameters there is nothing to search.
 ///
 /// # Errors
-/// What the problem's evaluation returns.
+/// A [`SolveError`] inside where options, bounds or start can't be used; else what the problem's evaluation returns.
 pub fn minimize<O: Linearize>(
     problem: O,
     solver: LevenbergMarquardt,
     start: DVector<f64>,
     max_iterations: u64,
 ) -> Result<Outcome, Error> {
+    solver.check(&start)?;
     if start.is_empty() {
         let cost = problem.cost(&start)?;
-        return Ok(Outcome { t: start, cost, stop: Stop::Gradient { cosine: 0.0 }, history: Vec::new() });
+        return Ok(Outcome { parameters: start, cost, stop: Stop::Gradient { cosine: 0.0 }, history: Vec::new() });
     }
     let configure =
         |state: argmin::core::IterState<_, (), (), (), (), f64>| state.param(start).max_iters(max_iterations);
     let result = Executor::new(problem, solver).configure(configure).run()?;
     let (here, stop, history) = result.solver.into_parts();
     let here = here.ok_or_else(|| Error::msg("the solver lost its point"))?;
-    Ok(Outcome { t: here.p, cost: here.at.cost, stop: stop.unwrap_or(Stop::MaxIterations), history })
+    Ok(Outcome { parameters: here.p, cost: here.at.cost, stop: stop.unwrap_or(Stop::MaxIterations), history })
 }

@@ -22,7 +22,7 @@ impl Linearize for Rosenbrock {
 fn the_curved_valley_is_followed_to_its_end() {
     let start = DVector::from_vec(vec![-1.2, 1.0]);
     let out = minimize(Rosenbrock, LevenbergMarquardt::default(), start, 200).expect("runs");
-    assert!((out.t[0] - 1.0).abs() < 1e-12 && (out.t[1] - 1.0).abs() < 1e-12, "{out:?}");
+    assert!((out.parameters[0] - 1.0).abs() < 1e-12 && (out.parameters[1] - 1.0).abs() < 1e-12, "{out:?}");
     assert!(out.history.windows(2).all(|w| w[1].cost <= w[0].cost));
 }
 
@@ -32,7 +32,7 @@ fn a_bound_holds_the_parameter_that_pushes_against_it() {
     let lm = LevenbergMarquardt::bounded(bounds);
     let out = minimize(Rosenbrock, lm, DVector::from_vec(vec![-1.2, 1.0]), 200).expect("runs");
     // On x = ½ the minimum is y = x².
-    assert!((out.t[0] - 0.5).abs() < 1e-15 && (out.t[1] - 0.25).abs() < 1e-9, "{out:?}");
+    assert!((out.parameters[0] - 0.5).abs() < 1e-15 && (out.parameters[1] - 0.25).abs() < 1e-9, "{out:?}");
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn a_column_of_zeros_does_not_stop_the_others() {
         }
     }
     let out = minimize(Idle, LevenbergMarquardt::default(), DVector::from_vec(vec![-7.0, 5.0]), 50).expect("runs");
-    assert!((out.t[0] - 3.0).abs() < 1e-9 && out.t[1] == 5.0, "{out:?}");
+    assert!((out.parameters[0] - 3.0).abs() < 1e-9 && out.parameters[1] == 5.0, "{out:?}");
 }
 
 #[test]
@@ -255,4 +255,39 @@ fn a_problem_s_own_error_comes_out() {
 fn a_normal_matrix_that_is_not_finite_is_said_to_be() {
     let at = Linearization::from_normal(1.0, DMatrix::from_element(2, 2, f64::NAN), &DVector::zeros(2));
     assert!(!at.is_finite());
+}
+
+#[test]
+fn every_way_in_refuses_what_cannot_be_used() {
+    let refused = |solver: LevenbergMarquardt, start: [f64; 2]| {
+        let start = DVector::from_column_slice(&start);
+        let problem = Formula::free(wavy_decay);
+        let short = minimize(Adapter::new(&problem), solver.clone(), start.clone(), 10).expect_err("refused");
+        let configure = |state: argmin::core::IterState<_, (), (), (), (), f64>| state.param(start);
+        let own = Executor::new(Adapter::new(&problem), solver).configure(configure).run().map(|_| ());
+        let (short, own) = (SolveError::from(short), SolveError::from(own.expect_err("refused")));
+        assert_eq!(short.to_string(), own.to_string());
+        own
+    };
+    let options = |radius| LevenbergMarquardt::new(SolverOptions { radius, ..SolverOptions::default() });
+    assert!(matches!(refused(options(-1.0), [1.0, 1.0]), SolveError::Option { field: "radius", .. }));
+    let bounded = LevenbergMarquardt::bounded;
+    assert!(matches!(refused(bounded(vec![(0.0, 1.0)]), [1.0; 2]), SolveError::BoundsCount { found: 1, expected: 2 }));
+    assert!(matches!(refused(bounded(vec![(0.0, 1.0), (2.0, 1.0)]), [1.0; 2]), SolveError::Bounds { index: 1, .. }));
+    assert!(matches!(refused(options(1.0), [1.0, f64::NAN]), SolveError::Start { index: 1, .. }));
+}
+
+#[test]
+fn a_run_by_the_executor_ends_where_solve_does_and_says_as_much() {
+    let problem = Formula::free(wavy_decay);
+    let solved = problem.solve(&[1.0, 1.0]).expect("solves");
+    let run = |most| {
+        let start = DVector::from_element(2, 1.0);
+        let configure = |state: argmin::core::IterState<_, (), (), (), (), f64>| state.param(start).max_iters(most);
+        let solver = LevenbergMarquardt::default();
+        Executor::new(Adapter::new(&problem), solver).configure(configure).run().expect("runs").solver
+    };
+    assert_eq!((run(1000).stop(), run(1000).history()), (Some(solved.stop), solved.history.as_slice()));
+    let cut = run(2);
+    assert_eq!((cut.stop(), cut.history()), (None, &solved.history[..3]));
 }
