@@ -3,6 +3,7 @@
 //! table is. `cargo bench --bench precision` prints a Markdown table.
 #![allow(clippy::expect_used)] // a bench may fail loudly
 
+use std::ops::Range;
 use std::time::Instant;
 
 use goniofit::numeric::random::{Purpose, RngExt, stream};
@@ -33,16 +34,17 @@ fn main() {
         y: [narrowed(&table.y[0]), narrowed(&table.y[1]), narrowed(&table.y[2])],
     };
     let energy: f64 = table.y.iter().flatten().zip(table.w.iter().cycle()).map(|(y, w)| w * y * y).sum();
-    let exact = cost(&in_double(&table), energy);
+    let double = || blocks(|r| vectorised(Double(table.block(r))));
+    let exact = cost(&double(), energy);
     println!("| arithmetic | data in memory | ms a pass | relative error of the cost |");
     println!("|---|---|---|---|");
     let row = |name: &str, stored: &str, pass: &dyn Fn() -> Sums| {
         let quickest = (0..ROUNDS).map(|_| timed(pass)).fold(f64::INFINITY, f64::min);
         println!("| {name} | {stored} | {quickest:.2} | {:.0e} |", (cost(&pass(), energy) / exact - 1.0).abs());
     };
-    row("64 bits", "64 bits", &|| in_double(&table));
-    row("32 bits", "32 bits", &|| in_single(&single.x, &single.w, &single.y));
-    row("32 bits", "64 bits", &|| converted(&table));
+    row("64 bits", "64 bits", &double);
+    row("32 bits", "32 bits", &|| blocks(|r| vectorised(Single(single.block(r)))));
+    row("32 bits", "64 bits", &|| blocks(|r| vectorised(Converted(table.block(r)))));
 }
 
 fn timed(pass: &dyn Fn() -> Sums) -> f64 {
@@ -76,7 +78,7 @@ fn cost(sums: &Sums, energy: f64) -> f64 {
     energy - (0..CHANNELS).map(explained).sum::<f64>()
 }
 
-fn blocks(block: impl Fn(std::ops::Range<usize>) -> Sums + Sync + Send) -> Sums {
+fn blocks(block: impl Fn(Range<usize>) -> Sums + Sync + Send) -> Sums {
     let parts: Vec<Sums> = (0..SAMPLES.div_ceil(BLOCK))
         .into_par_iter()
         .map(|b| block(b * BLOCK..((b + 1) * BLOCK).min(SAMPLES)))
@@ -84,114 +86,86 @@ fn blocks(block: impl Fn(std::ops::Range<usize>) -> Sums + Sync + Send) -> Sums 
     parts.iter().fold([0.0; SUMS], |sum, part| std::array::from_fn(|k| sum[k] + part[k]))
 }
 
-fn in_double(table: &Table<f64>) -> Sums {
-    blocks(|r| {
-        vectorised(Double {
-            x: &table.x[r.clone()],
-            w: &table.w[r.clone()],
-            y: table.y.each_ref().map(|y| &y[r.clone()]),
-        })
-    })
+impl<T> Table<T> {
+    fn block(&self, range: Range<usize>) -> Samples<'_, T> {
+        Samples {
+            x: &self.x[range.clone()],
+            w: &self.w[range.clone()],
+            y: self.y.each_ref().map(|y| &y[range.clone()]),
+        }
+    }
 }
 
-fn in_single(x: &[f32], w: &[f32], y: &[Vec<f32>; CHANNELS]) -> Sums {
-    blocks(|r| vectorised(Single { x: &x[r.clone()], w: &w[r.clone()], y: y.each_ref().map(|y| &y[r.clone()]) }))
+/// Samples of a block.
+struct Samples<'a, T> {
+    x: &'a [T],
+    w: &'a [T],
+    y: [&'a [T]; CHANNELS],
 }
 
-fn converted(table: &Table<f64>) -> Sums {
-    blocks(|r| {
-        vectorised(Converted {
-            x: &table.x[r.clone()],
-            w: &table.w[r.clone()],
-            y: table.y.each_ref().map(|y| &y[r.clone()]),
-        })
-    })
-}
+/// Which of (1, w, φ, xφ, wφ, wxφ, y of every channel) are multiplied in each sum.
+const TERMS: [(usize, usize); SUMS] = [
+    (1, 0),
+    (4, 0),
+    (4, 2),
+    (5, 0),
+    (5, 2),
+    (5, 3),
+    (1, 6),
+    (4, 6),
+    (5, 6),
+    (1, 7),
+    (4, 7),
+    (5, 7),
+    (1, 8),
+    (4, 8),
+    (5, 8),
+];
 
-struct Double<'a> {
-    x: &'a [f64],
-    w: &'a [f64],
-    y: [&'a [f64]; CHANNELS],
-}
+struct Double<'a>(Samples<'a, f64>);
 
 impl Kernel for Double<'_> {
     type Output = Sums;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Sums {
+        let Samples { x, w, y } = self.0;
         let mut phi = [0.0; BLOCK];
-        phi.iter_mut().zip(self.x).for_each(|(p, x)| *p = exp(EXPONENT * x));
+        phi.iter_mut().zip(x).for_each(|(p, x)| *p = exp(EXPONENT * x));
         let mut sums = [simd.splat_f64s(0.0); SUMS];
-        let lists =
-            [self.x, self.w, self.y[0], self.y[1], self.y[2], &phi[..self.x.len()]].map(|l| S::as_simd_f64s(l).0);
+        let lists = [x, w, &phi[..x.len()], y[0], y[1], y[2]].map(|l| S::as_simd_f64s(l).0);
         for i in 0..lists[0].len() {
-            let [x, w, y0, y1, y2, phi] = lists.map(|l| l[i]);
-            let (a, b) = (simd.mul_f64s(w, phi), simd.mul_f64s(x, phi));
-            let c = simd.mul_f64s(w, b);
-            let terms = [
-                (w, simd.splat_f64s(1.0)),
-                (a, simd.splat_f64s(1.0)),
-                (a, phi),
-                (c, simd.splat_f64s(1.0)),
-                (c, phi),
-                (c, b),
-                (w, y0),
-                (a, y0),
-                (c, y0),
-                (w, y1),
-                (a, y1),
-                (c, y1),
-                (w, y2),
-                (a, y2),
-                (c, y2),
-            ];
-            for (sum, (p, q)) in sums.iter_mut().zip(terms) {
-                *sum = simd.mul_add_f64s(p, q, *sum);
+            let [x, w, phi, y0, y1, y2] = lists.map(|l| l[i]);
+            let slope = simd.mul_f64s(x, phi);
+            let one = simd.splat_f64s(1.0);
+            let factors = [one, w, phi, slope, simd.mul_f64s(w, phi), simd.mul_f64s(w, slope), y0, y1, y2];
+            for (sum, (p, q)) in sums.iter_mut().zip(TERMS) {
+                *sum = simd.mul_add_f64s(factors[p], factors[q], *sum);
             }
         }
         sums.map(|s| simd.reduce_sum_f64s(s))
     }
 }
 
-struct Single<'a> {
-    x: &'a [f32],
-    w: &'a [f32],
-    y: [&'a [f32]; CHANNELS],
-}
+struct Single<'a>(Samples<'a, f32>);
 
 impl Kernel for Single<'_> {
     type Output = Sums;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Sums {
+        let Samples { x, w, y } = self.0;
         let mut phi = [0.0f32; BLOCK];
-        phi.iter_mut().zip(self.x).for_each(|(p, x)| *p = exp_single(EXPONENT as f32 * x));
+        phi.iter_mut().zip(x).for_each(|(p, x)| *p = exp_single(EXPONENT as f32 * x));
         let mut sums = [simd.splat_f32s(0.0); SUMS];
-        let lists =
-            [self.x, self.w, self.y[0], self.y[1], self.y[2], &phi[..self.x.len()]].map(|l| S::as_simd_f32s(l).0);
+        let lists = [x, w, &phi[..x.len()], y[0], y[1], y[2]].map(|l| S::as_simd_f32s(l).0);
         for i in 0..lists[0].len() {
-            let [x, w, y0, y1, y2, phi] = lists.map(|l| l[i]);
-            let (a, b) = (simd.mul_f32s(w, phi), simd.mul_f32s(x, phi));
-            let c = simd.mul_f32s(w, b);
-            let terms = [
-                (w, simd.splat_f32s(1.0)),
-                (a, simd.splat_f32s(1.0)),
-                (a, phi),
-                (c, simd.splat_f32s(1.0)),
-                (c, phi),
-                (c, b),
-                (w, y0),
-                (a, y0),
-                (c, y0),
-                (w, y1),
-                (a, y1),
-                (c, y1),
-                (w, y2),
-                (a, y2),
-                (c, y2),
-            ];
-            for (sum, (p, q)) in sums.iter_mut().zip(terms) {
-                *sum = simd.mul_add_f32s(p, q, *sum);
+            let [x, w, phi, y0, y1, y2] = lists.map(|l| l[i]);
+            let slope = simd.mul_f32s(x, phi);
+            let one = simd.splat_f32s(1.0);
+            let factors = [one, w, phi, slope, simd.mul_f32s(w, phi), simd.mul_f32s(w, slope), y0, y1, y2];
+            for (sum, (p, q)) in sums.iter_mut().zip(TERMS) {
+                *sum = simd.mul_add_f32s(factors[p], factors[q], *sum);
             }
         }
         sums.map(|s| f64::from(simd.reduce_sum_f32s(s)))
@@ -199,24 +173,21 @@ impl Kernel for Single<'_> {
 }
 
 /// [`Single`] after narrowing the block.
-struct Converted<'a> {
-    x: &'a [f64],
-    w: &'a [f64],
-    y: [&'a [f64]; CHANNELS],
-}
+struct Converted<'a>(Samples<'a, f64>);
 
 impl Kernel for Converted<'_> {
     type Output = Sums;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Sums {
-        let n = self.x.len();
+        let Samples { x, w, y } = self.0;
+        let n = x.len();
         let mut lists = [[0.0f32; BLOCK]; 2 + CHANNELS];
-        for (to, from) in lists.iter_mut().zip([self.x, self.w, self.y[0], self.y[1], self.y[2]]) {
+        for (to, from) in lists.iter_mut().zip([x, w, y[0], y[1], y[2]]) {
             to.iter_mut().zip(from).for_each(|(to, v)| *to = *v as f32);
         }
         let [x, w, y0, y1, y2] = &lists;
-        Single { x: &x[..n], w: &w[..n], y: [&y0[..n], &y1[..n], &y2[..n]] }.run(simd)
+        Single(Samples { x: &x[..n], w: &w[..n], y: [&y0[..n], &y1[..n], &y2[..n]] }).run(simd)
     }
 }
 
