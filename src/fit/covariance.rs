@@ -4,8 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::folded::{OnLines, Products, Residuals};
+use super::leverage::leveraged;
 use super::loss::Datum;
 use super::merl_lines::{Line, MerlLines};
+use super::part::SMALL;
 use super::passes::{Moments, Projected, Scratch};
 use super::reduced::{Problem, Solution};
 use super::samples::Block;
@@ -43,8 +45,8 @@ pub(super) struct Uncertainty {
     pub neighbours: Neighbours,
     /// Σ w σ_r² over samples and channels with a stated σ, and how many there are.
     pub stated: (f64, usize),
-    /// Quantile of Student's t for 95 %, two-sided.
-    pub quantile: f64,
+    /// Quantile of Student's t for 95 %, two-sided, of each parameter.
+    pub quantiles: Vec<f64>,
 }
 
 /// An eigenvalue of the scaled normal matrix below this share of the largest means: not determined by the data.
@@ -100,6 +102,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
 
     let has_sigma = samples.measurement.sigma.is_some() && problem.saturation.is_none();
     let (mut normal, mut spread) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
+    let mut by_residuals = DMatrix::zeros(parameters, parameters);
     let mut clusters = DMatrix::zeros(parameters, parameters);
     let mut common = vec![DVector::zeros(parameters); samples.measurement.common.len()];
     let mut dark = vec![false; channels];
@@ -117,8 +120,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
                     let squares = if has_sigma { &sums.squares } else { &sums.spread };
                     normal[(a, b)] += both * sums.normal[(i.max(j), i.min(j))];
                     drawn[(a, b)] += both * squares[(i.max(j), i.min(j))];
-                    spread[(a, b)] +=
-                        both * (sums.known[(i.max(j), i.min(j))] + inflation * sums.spread[(i.max(j), i.min(j))]);
+                    spread[(a, b)] += both * sums.known[(i.max(j), i.min(j))];
+                    by_residuals[(a, b)] += both * sums.spread[(i.max(j), i.min(j))];
                 }
                 common.iter_mut().zip(&sums.common).for_each(|(total, part)| total[a] += strength[i] * part[i]);
             }
@@ -139,9 +142,22 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         }
     }
     let sandwich = Sandwich::new(&normal, &pinned, &limited(problem, at, &pinned));
+    let told_by_residuals = problem.saturation.is_some() || stated.1 < n;
+    let leveraged = (n <= SMALL && freedom > 0.0 && told_by_residuals).then(|| leveraged(problem, at, &sandwich.bread));
+    let known = spread.clone();
+    spread += leveraged.as_ref().map_or(by_residuals * inflation, |l| l.spread.clone());
     let covariance = sandwich.covariance(&spread, &common);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
+    let known = sandwich.covariance(&known, &common);
+    let quantiles = (0..parameters)
+        .map(|i| {
+            let few = leveraged.as_ref().map_or((0.0, 0.0), |l| l.freedom[i]);
+            // Satterthwaite: what is known has no end of degrees of freedom.
+            let few = if few.1 > 0.0 { few.1 * (1.0 + known[(i, i)] / few.0).powi(2) } else { f64::INFINITY };
+            student_quantile(0.975, few.min(freedom).max(1.0))
+        })
+        .collect();
     let grouped = sandwich.covariance(&(clusters * (count as f64 / (count as f64 - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&drawn, &[]);
     let design_effect = (&normal * &grouped).trace() / (&normal * &drawn).trace();
@@ -157,7 +173,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         bread: sandwich.bread,
         neighbours,
         stated,
-        quantile: student_quantile(0.975, freedom.max(1.0)),
+        quantiles,
     }
 }
 
@@ -364,8 +380,12 @@ impl ChannelSums {
         }
         let data_slopes = data_slopes(problem, block, channel, &scratch.f);
         scratch.squared_pull();
-        if let Some(sigma) = measurement.sigma_plane(own) {
-            let known = self.stated(block, w, &data_slopes, sigma);
+        let known = stated_errors(problem, block, channel, &scratch.f);
+        if !known.is_empty() {
+            for (s, w) in known.iter().zip(w) {
+                self.stated.0 += s.map_or(0.0, |s| w * s * s);
+                self.stated.1 += usize::from(s.is_some());
+            }
             if problem.saturation.is_none() {
                 scratch.tally(k, &mut gradient, &mut self.squares);
                 let mut rest = std::mem::take(&mut scratch.weight);
@@ -391,20 +411,18 @@ impl ChannelSums {
         }
         gradient
     }
+}
 
-    /// σ_r of every value that states its σ.
-    fn stated(&mut self, block: &Block, w: &[f64], data_slopes: &[f64], sigma: &[f64]) -> Vec<Option<f64>> {
-        let of = |i: usize| {
-            let s = data_slopes[i].abs() * sigma[block.index[i] as usize];
-            (s.is_finite() && s > 0.0 && w[i] > 0.0).then_some(s)
-        };
-        let known: Vec<Option<f64>> = (0..block.len()).map(of).collect();
-        for (s, w) in known.iter().zip(w) {
-            self.stated.0 += s.map_or(0.0, |s| w * s * s);
-            self.stated.1 += usize::from(s.is_some());
-        }
-        known
-    }
+/// σ_r of every value of a block that states its σ; empty where the measurement states none.
+pub(super) fn stated_errors(problem: &Problem<'_>, block: &Block, channel: usize, f: &[f64]) -> Vec<Option<f64>> {
+    let samples = problem.samples;
+    let Some(sigma) = samples.measurement.sigma_plane(samples.channels[channel]) else { return Vec::new() };
+    let (slopes, w) = (data_slopes(problem, block, channel, f), block.weight(channel));
+    let of = |i: usize| {
+        let s = slopes[i].abs() * sigma[block.index[i] as usize];
+        (s.is_finite() && s > 0.0 && w[i] > 0.0).then_some(s)
+    };
+    (0..block.len()).map(of).collect()
 }
 
 /// ∂r/∂y in the fit's scale, for errors in the data's own unit; empty where the measurement states none.

@@ -31,11 +31,11 @@ pub(super) fn is_at_end(problem: &Problem<'_>, at: &Solution, uncertainty: &Unce
 
 /// Estimate ± t·σ of every parameter, cut to its range; none for a shape at an end of it.
 pub(super) fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
-    let q = uncertainty.quantile;
     let around = |i: usize| {
         let error = uncertainty.errors[i].filter(|_| !is_at_end(problem, at, uncertainty, i))?;
         let (value, (low, high)) = parameter(problem, at, i);
-        Some(((value - q * error).max(low), (value + q * error).min(high)))
+        let reach = uncertainty.quantiles[i] * error;
+        Some(((value - reach).max(low), (value + reach).min(high)))
     };
     (0..uncertainty.errors.len()).map(around).collect()
 }
@@ -49,7 +49,7 @@ pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncerta
     for (i, interval) in intervals.iter_mut().enumerate() {
         let Some(error) = uncertainty.errors[i] else { continue };
         let (value, (low, high)) = parameter(problem, at, i);
-        let reach = uncertainty.quantile * error;
+        let reach = uncertainty.quantiles[i] * error;
         let at_end = is_at_end(problem, at, uncertainty, i);
         let near_end =
             i < weights && (value - low < 1.5 * reach || high - value < 1.5 * reach || is_capped(problem, at, i));

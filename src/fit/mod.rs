@@ -16,6 +16,7 @@ mod folded;
 mod identify;
 mod intervals;
 mod joint;
+mod leverage;
 mod limits;
 mod loss;
 mod merl_lines;
