@@ -7,6 +7,7 @@ use super::folded::{OnLines, Products, Residuals};
 use super::leverage::leveraged;
 use super::loss::Datum;
 use super::merl_lines::{Line, MerlLines};
+use super::outliers::Outliers;
 use super::part::SMALL;
 use super::passes::{Moments, Projected, Scratch};
 use super::reduced::{Problem, Solution};
@@ -45,6 +46,8 @@ pub(super) struct Uncertainty {
     pub neighbours: Neighbours,
     /// Σ w σ_r² over samples and channels with a stated σ, and how many there are.
     pub stated: (f64, usize),
+    /// Number of gross outliers, where they lean to one side.
+    pub leaning: Option<usize>,
     /// Quantile of Student's t for 95 %, two-sided, of each parameter.
     pub quantiles: Vec<f64>,
 }
@@ -66,6 +69,7 @@ struct ChannelSums {
     /// B of all values by their residuals; the same as `spread` where no σ is stated.
     squares: DMatrix<f64>,
     common: Vec<DVector<f64>>,
+    outliers: Outliers,
     /// Whether a sample lies where the lobes with a shape are 0 whatever it is.
     dark: bool,
     stated: (f64, usize),
@@ -105,6 +109,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let mut by_residuals = DMatrix::zeros(parameters, parameters);
     let mut clusters = DMatrix::zeros(parameters, parameters);
     let mut common = vec![DVector::zeros(parameters); samples.measurement.common.len()];
+    let mut outliers = Outliers::new(parameters);
     let mut dark = vec![false; channels];
     let mut drawn = DMatrix::zeros(parameters, parameters);
     let (mut cost, mut stated, mut neighbours, mut count) = (0.0, (0.0, 0), Neighbours::default(), 0);
@@ -125,6 +130,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
                 }
                 common.iter_mut().zip(&sums.common).for_each(|(total, part)| total[a] += strength[i] * part[i]);
             }
+            outliers.add_channel(&sums.outliers, &strength, &place);
             cost += sums.cost;
             stated = (stated.0 + sums.stated.0, stated.1 + sums.stated.1);
             neighbours.add(&sums.neighbours);
@@ -146,7 +152,9 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let leveraged = (n <= SMALL && freedom > 0.0 && told_by_residuals).then(|| leveraged(problem, at, &sandwich.bread));
     let known = spread.clone();
     spread += leveraged.as_ref().map_or(by_residuals * inflation, |l| l.spread.clone());
-    let covariance = sandwich.covariance(&spread, &common);
+    let shared: Vec<_> = common.iter().cloned().chain([outliers.shared(&sandwich.bread)]).collect();
+    let covariance = sandwich.covariance(&spread, &shared);
+    let leaning = outliers.lean(&sandwich.bread).then_some(outliers.count);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
     let known = sandwich.covariance(&known, &common);
@@ -173,6 +181,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         bread: sandwich.bread,
         neighbours,
         stated,
+        leaning,
         quantiles,
     }
 }
@@ -259,6 +268,7 @@ impl Part {
             known: DMatrix::zeros(k, k),
             squares: DMatrix::zeros(k, k),
             common: vec![DVector::zeros(k); problem.samples.measurement.common.len()],
+            outliers: Outliers::new(k),
             dark: false,
             stated: (0.0, 0),
             neighbours: Neighbours::default(),
@@ -398,6 +408,7 @@ impl ChannelSums {
             }
         }
         scratch.tally(k, &mut gradient, &mut self.spread);
+        self.outliers.add(scratch, problem.saturation);
         for (component, total) in self.common.iter_mut().enumerate() {
             let u = measurement.common_plane(component, own);
             let trust = |i: usize| scratch.trust.get(i).copied().unwrap_or(1.0);

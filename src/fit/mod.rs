@@ -23,6 +23,7 @@ mod merl_lines;
 mod missing;
 mod offset;
 mod options;
+mod outliers;
 mod part;
 mod passes;
 mod quadratic;
