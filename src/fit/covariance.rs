@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::folded::{OnLines, Products, Residuals};
-use super::leverage::leveraged;
+use super::leverage::Leveraged;
 use super::loss::Datum;
 use super::merl_lines::{Line, MerlLines};
 use super::outliers::Outliers;
@@ -48,8 +48,8 @@ pub(super) struct Uncertainty {
     pub stated: (f64, usize),
     /// Number of gross outliers, where they lean to one side.
     pub leaning: Option<usize>,
-    /// Quantile of Student's t for 95 %, two-sided, of each parameter.
-    pub quantiles: Vec<f64>,
+    /// Half width of each parameter's 95 % interval over its standard error: Student's t, and what leverage asks for.
+    pub reach: Vec<f64>,
 }
 
 /// An eigenvalue of the scaled normal matrix below this share of the largest means: not determined by the data.
@@ -105,7 +105,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     parts.iter_mut().for_each(Part::close);
 
     let has_sigma = samples.measurement.sigma.is_some() && problem.saturation.is_none();
-    let (mut normal, mut spread) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
+    let (mut normal, mut known) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
     let mut by_residuals = DMatrix::zeros(parameters, parameters);
     let mut clusters = DMatrix::zeros(parameters, parameters);
     let mut common = vec![DVector::zeros(parameters); samples.measurement.common.len()];
@@ -125,7 +125,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
                     let squares = if has_sigma { &sums.squares } else { &sums.spread };
                     normal[(a, b)] += both * sums.normal[(i.max(j), i.min(j))];
                     drawn[(a, b)] += both * squares[(i.max(j), i.min(j))];
-                    spread[(a, b)] += both * sums.known[(i.max(j), i.min(j))];
+                    known[(a, b)] += both * sums.known[(i.max(j), i.min(j))];
                     by_residuals[(a, b)] += both * sums.spread[(i.max(j), i.min(j))];
                 }
                 common.iter_mut().zip(&sums.common).for_each(|(total, part)| total[a] += strength[i] * part[i]);
@@ -148,24 +148,18 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         }
     }
     let sandwich = Sandwich::new(&normal, &pinned, &limited(problem, at, &pinned));
-    let told_by_residuals = problem.saturation.is_some() || stated.1 < n;
-    let leveraged = (n <= SMALL && freedom > 0.0 && told_by_residuals).then(|| leveraged(problem, at, &sandwich.bread));
-    let known = spread.clone();
-    spread += leveraged.as_ref().map_or(by_residuals * inflation, |l| l.spread.clone());
     let shared: Vec<_> = common.iter().cloned().chain([outliers.shared(&sandwich.bread)]).collect();
-    let covariance = sandwich.covariance(&spread, &shared);
+    let covariance = sandwich.covariance(&(&known + by_residuals * inflation), &shared);
     let leaning = outliers.lean(&sandwich.bread).then_some(outliers.count);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
-    let known = sandwich.covariance(&known, &common);
-    let quantiles = (0..parameters)
-        .map(|i| {
-            let few = leveraged.as_ref().map_or((0.0, 0.0), |l| l.freedom[i]);
-            // Satterthwaite: what is known has no end of degrees of freedom.
-            let few = if few.1 > 0.0 { few.1 * (1.0 + known[(i, i)] / few.0).powi(2) } else { f64::INFINITY };
-            student_quantile(0.975, few.min(freedom).max(1.0))
-        })
-        .collect();
+    let told_by_residuals = problem.saturation.is_some() || stated.1 < n;
+    let reach = if n <= SMALL && freedom > 0.0 && told_by_residuals {
+        let certain = sandwich.covariance(&known, &shared).diagonal();
+        Leveraged::new(problem, at, &sandwich.bread).reach(&certain, &covariance.diagonal(), freedom)
+    } else {
+        vec![student_quantile(0.975, freedom.max(1.0)); parameters]
+    };
     let grouped = sandwich.covariance(&(clusters * (count as f64 / (count as f64 - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&drawn, &[]);
     let design_effect = (&normal * &grouped).trace() / (&normal * &drawn).trace();
@@ -182,7 +176,7 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         neighbours,
         stated,
         leaning,
-        quantiles,
+        reach,
     }
 }
 

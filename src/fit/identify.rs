@@ -64,7 +64,7 @@ fn mark(
     let unproved = |lobe: usize| {
         let may_be_0 = |c: usize| {
             let error = uncertainty.errors[c * lobes + lobe].unwrap_or(f64::INFINITY);
-            problem.ranges[c][lobe].0 == 0.0 && at.weights[c][lobe] <= uncertainty.quantiles[c * lobes + lobe] * error
+            problem.ranges[c][lobe].0 == 0.0 && at.weights[c][lobe] <= uncertainty.reach[c * lobes + lobe] * error
         };
         (0..channels).all(may_be_0)
     };

@@ -34,7 +34,7 @@ pub(super) fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertai
     let around = |i: usize| {
         let error = uncertainty.errors[i].filter(|_| !is_at_end(problem, at, uncertainty, i))?;
         let (value, (low, high)) = parameter(problem, at, i);
-        let reach = uncertainty.quantiles[i] * error;
+        let reach = uncertainty.reach[i] * error;
         Some(((value - reach).max(low), (value + reach).min(high)))
     };
     (0..uncertainty.errors.len()).map(around).collect()
@@ -49,7 +49,7 @@ pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncerta
     for (i, interval) in intervals.iter_mut().enumerate() {
         let Some(error) = uncertainty.errors[i] else { continue };
         let (value, (low, high)) = parameter(problem, at, i);
-        let reach = uncertainty.quantiles[i] * error;
+        let reach = uncertainty.reach[i] * error;
         let at_end = is_at_end(problem, at, uncertainty, i);
         let near_end =
             i < weights && (value - low < 1.5 * reach || high - value < 1.5 * reach || is_capped(problem, at, i));

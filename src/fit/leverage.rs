@@ -9,15 +9,17 @@ use super::covariance::stated_errors;
 use super::passes::Scratch;
 use super::reduced::{Problem, Solution};
 use super::samples::Block;
+use crate::numeric::stats::student_quantile;
 
 /// Where 1 − h is not far above this the residual says little of its noise: the mean of the channel's counts instead.
 const LEAST: f64 = 0.01;
 
 /// B of the values whose error only their residuals tell, and what it is worth.
-pub(super) struct Leveraged {
-    pub spread: DMatrix<f64>,
-    /// Variance of each parameter by it and, over that, the variance's own degrees of freedom.
-    pub freedom: Vec<(f64, f64)>,
+pub(super) struct Leveraged<'a> {
+    bread: &'a DMatrix<f64>,
+    spread: DMatrix<f64>,
+    /// Of each parameter: variance by these values if the noise is the same everywhere, and variance of that.
+    influence: Vec<(f64, f64)>,
 }
 
 /// Sums of one channel, of bare columns.
@@ -33,35 +35,50 @@ struct ChannelSums {
     influence: Vec<(f64, f64)>,
 }
 
-/// The sums at a solution; `bread` is A⁻¹.
-pub(super) fn leveraged(problem: &Problem<'_>, at: &Solution, bread: &DMatrix<f64>) -> Leveraged {
-    let (channels, parameters) = (at.weights.len(), bread.nrows());
-    let k = problem.kinds.len() + problem.layout.len();
-    let zero = ChannelSums {
-        squares: DMatrix::zeros(k, k),
-        mean: DMatrix::zeros(k, k),
-        noise: (0.0, 0.0),
-        influence: vec![(0.0, 0.0); parameters],
-    };
-    let start = || (vec![zero.clone(); channels], Scratch::default());
-    let parts = problem.samples.map_pieces(start, |(sums, scratch), block| {
-        scratch.basis(&block.x, &at.lobes);
-        for (sums, (c, x)) in sums.iter_mut().zip(at.weights.iter().enumerate()) {
-            scratch.residuals(problem.samples, block, c, x, problem.saturation);
-            sums.add(problem, at, block, c, scratch, bread);
+impl<'a> Leveraged<'a> {
+    /// The sums at a solution; `bread` is A⁻¹.
+    pub fn new(problem: &Problem<'_>, at: &Solution, bread: &'a DMatrix<f64>) -> Self {
+        let (channels, parameters) = (at.weights.len(), bread.nrows());
+        let k = problem.kinds.len() + problem.layout.len();
+        let zero = ChannelSums {
+            squares: DMatrix::zeros(k, k),
+            mean: DMatrix::zeros(k, k),
+            noise: (0.0, 0.0),
+            influence: vec![(0.0, 0.0); parameters],
+        };
+        let start = || (vec![zero.clone(); channels], Scratch::default());
+        let parts = problem.samples.map_pieces(start, |(sums, scratch), block| {
+            scratch.basis(&block.x, &at.lobes);
+            for (sums, (c, x)) in sums.iter_mut().zip(at.weights.iter().enumerate()) {
+                scratch.residuals(problem.samples, block, c, x, problem.saturation);
+                sums.add(problem, at, block, c, scratch, bread);
+            }
+        });
+        let spread = DMatrix::zeros(parameters, parameters);
+        let mut found = Self { bread, spread, influence: vec![(0.0, 0.0); parameters] };
+        for c in 0..channels {
+            let mut sums = zero.clone();
+            parts.iter().for_each(|(part, _)| sums.merge(&part[c]));
+            found.add(problem, at, c, &sums);
         }
-    });
-    let mut found = Leveraged { spread: DMatrix::zeros(parameters, parameters), freedom: vec![(0.0, 0.0); parameters] };
-    for c in 0..channels {
-        let mut sums = zero.clone();
-        parts.iter().for_each(|(part, _)| sums.merge(&part[c]));
-        found.add(problem, at, c, &sums);
+        found
     }
-    found.freedom.iter_mut().filter(|f| f.1 > 0.0).for_each(|f| f.1 = f.0 * f.0 / f.1);
-    found
-}
 
-impl Leveraged {
+    /// Half width of each parameter's 95 % interval over its standard error, whose square is `variance`; `certain` is the part of the
+    /// variance that is known, and `freedom` the residuals less the parameters.
+    pub fn reach(&self, certain: &DVector<f64>, variance: &DVector<f64>, freedom: f64) -> Vec<f64> {
+        let own = (self.bread * &self.spread * self.bread).diagonal();
+        let of = |i: usize| {
+            let (mean, scatter) = self.influence[i];
+            // Satterthwaite 1946: what is known has no end of degrees of freedom.
+            let few = if scatter > 0.0 { (mean + certain[i]).powi(2) / scatter } else { f64::INFINITY };
+            let wider = ((own[i] + certain[i]) / variance[i]).sqrt();
+            let t = student_quantile(0.975, few.min(freedom).max(1.0));
+            if wider.is_finite() { t * wider } else { t }
+        };
+        (0..own.len()).map(of).collect()
+    }
+
     fn add(&mut self, problem: &Problem<'_>, at: &Solution, channel: usize, sums: &ChannelSums) {
         let noise = if sums.noise.1 > 0.0 { sums.noise.0 / sums.noise.1 } else { 0.0 };
         let strength = problem.strength(&at.weights[channel]);
@@ -72,7 +89,7 @@ impl Leveraged {
                 self.spread[(a, b)] += strength[i] * strength[j] * (sums.squares[(i, j)] + noise * sums.mean[(i, j)]);
             }
         }
-        for (total, own) in self.freedom.iter_mut().zip(&sums.influence) {
+        for (total, own) in self.influence.iter_mut().zip(&sums.influence) {
             *total = (total.0 + noise * own.0, total.1 + noise * noise * own.1);
         }
     }
