@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use goniofit::fit::RobustKind;
+use goniofit::fit::{Limit, RobustKind};
 use goniofit::gonio::Scan;
 use goniofit::measurement::formats::{self, ReadOptions};
 use rayon::prelude::*;
@@ -117,4 +117,42 @@ fn a_real_yellow_tape_is_said_not_to_be_a_phong_lobe() {
 #[test]
 fn a_real_grey_tape_is_said_not_to_be_a_phong_lobe() {
     a_real_tape_is_no_phong_lobe("retro-gray-tape.alta.dat");
+}
+
+/// One sample on a narrow peak of a known width: the fit passes through it, so that its residual says nothing of its noise, and the weight's
+/// error, which is made of residuals, is next to nothing. The interval takes the noise of the others for it.
+#[test]
+fn the_interval_of_what_one_sample_decides_is_by_the_others_noise() {
+    let truth = material(&[0.3], &[0.2], 1e5);
+    let scan = part_of(&Scan::InPlane { step_deg: 2.5 }, |wi, wo| {
+        let peak = cos_alpha(wi, wo);
+        peak < 0.99 || peak > 1.0 - 1e-9 && wi.z > 0.99
+    });
+    let mut o = options("lambert+phong");
+    o.limits.push(Limit::fixed("phong.exponent=1e5").expect("a limit"));
+    let (mut held, seeds) = (0, 100);
+    for seed in 0..seeds {
+        let mut m = exact(&truth, &scan);
+        let mut rng = draws(seed);
+        m.values.iter_mut().for_each(|v| *v += 0.01 * normal(&mut rng));
+        let got = solved(&m, &o);
+        let (low, high) = intervals(&got)[1].expect("an interval");
+        let noise = 0.01 * std::f64::consts::TAU / 100_002.0;
+        assert!(high - low < 6.0 * noise, "seed {seed}: {low} to {high}");
+        held += u64::from((low..=high).contains(&0.2));
+    }
+    // 95 % of 100, four standard deviations below.
+    assert!(held >= 86, "{held} of {seeds}");
+}
+
+/// Huber's pull does not fade: outliers to one side move its weights by several of the noise's standard errors. What they pull counts.
+#[test]
+fn a_huber_fit_pulled_to_one_side_says_how_far() {
+    let cell = Cell {
+        outliers: Outliers::OneSided(0.05),
+        robust: Some(RobustKind::Huber),
+        ..Cell::plain(HEMISPHERE(10.0), 1e5)
+    };
+    let held: Vec<[bool; 3]> = (0..40).map(|seed| cell.held([0.3, 0.2, 40.0], seed)).collect();
+    assert!((0..3).all(|p| held.iter().filter(|h| h[p]).count() >= 35), "{held:?}");
 }
