@@ -24,6 +24,7 @@ mod offset;
 mod options;
 mod part;
 mod passes;
+mod profile;
 mod quadratic;
 mod record;
 mod reduced;
