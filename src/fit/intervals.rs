@@ -1,11 +1,17 @@
 //! 95 % intervals. Where a parameter is nonlinear or near the end of its range the interval is read off its profile: the values at which the
 //! cost, minimised over everything else, has risen by as much as the standard error's own curvature says for 95 % (the
-//! profile calibrated by the sandwich: Chandler & Bate 2007). Elsewhere it is estimate ± t·σ, for exponents in their logarithm.
+//! profile calibrated by the sandwich: Chandler & Bate 2007). Elsewhere it is estimate ± t·σ, for exponents in their logarithm: also where the
+//! profile can't be followed.
 //! A shape at an end of its range has an interval by profile alone, from that end inwards.
+
+use std::cell::RefCell;
 
 use nalgebra::DVector;
 
 use super::covariance::{Interval, Uncertainty};
+use super::joint;
+use super::part::{ROUNDING, SMALL};
+use super::profile::Trail;
 use super::reduced::{Problem, Search, Solution};
 use super::solver::{self, LevenbergMarquardt, SolverOptions};
 
@@ -16,8 +22,13 @@ pub(super) type Intervals = Vec<Option<Interval>>;
 const NARROW: f64 = 0.03;
 /// A rise of the cost below this share of the data's energy is not resolved by a difference of sums.
 const RESOLVED: f64 = 1e-11;
-/// Steps of the search for each end.
-const STEPS: usize = 40;
+/// How far the root of the rise may be off, and steps of the search for each end; on a large table, where each takes passes.
+const CLOSE: f64 = 1e-4;
+const TRIES: usize = 40;
+const CLOSE_LARGE: f64 = 1e-2;
+const TRIES_LARGE: usize = 8;
+/// A cost that is lower than the estimate's by this share of the wanted rise is another valley's, not the tolerance of a descent.
+const LOWER: f64 = 0.01;
 
 /// Whether parameter `i` is a shape that ended at an end of its range, though the data determine it: the cost falls on beyond that end, so that
 /// no parabola, and no standard error, tells where the parameter may be.
@@ -40,32 +51,85 @@ pub(super) fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertai
     (0..uncertainty.errors.len()).map(around).collect()
 }
 
-/// [`plain`], by profile where that differs.
-pub(super) fn profiled(search: &Search<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
-    let problem = search.problem;
+/// [`plain`], by profile where that differs, the transforms knowing the cost.
+pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
+    let resolved = RESOLVED * search.energy.iter().sum::<f64>();
+    let fine = Fineness { resolved, tolerance: CLOSE, tries: TRIES };
+    profiled(search.problem, at, uncertainty, fine, |i, _| Box::new(move |value| least_cost(search, at, i, value)))
+}
+
+/// [`plain`], by profile where that differs, by passes over the samples: few on a large table. Where a profile meets a point lower than the
+/// estimate, and so another valley, that point too, and the other profiles are left out.
+pub(super) fn by_passes(
+    problem: &Problem<'_>,
+    at: &Solution,
+    uncertainty: &Uncertainty,
+) -> (Intervals, Option<Solution>) {
+    let residuals = problem.samples.residuals();
+    let is_large = residuals > SMALL;
+    let is_rounding = at.cost <= ROUNDING * ROUNDING * residuals as f64;
+    if is_rounding || is_large && (problem.cap.is_some() || !joint::is_small(problem)) {
+        return (plain(problem, at, uncertainty), None);
+    }
+    let (tolerance, tries) = if is_large { (CLOSE_LARGE, TRIES_LARGE) } else { (CLOSE, TRIES) };
+    let fine = Fineness { resolved: RESOLVED * at.cost, tolerance, tries };
+    let lower = RefCell::new(None);
+    let intervals = profiled(problem, at, uncertainty, fine, |i, rise| {
+        let mut trail = Trail::new(problem, at, &uncertainty.bread, i, 0.1 * tolerance * rise);
+        let lower = &lower;
+        Box::new(move |value| {
+            let cost = if lower.borrow().is_some() { f64::NAN } else { trail.cost(value) };
+            if cost < at.cost - LOWER * rise {
+                lower.replace(Some(trail.at().clone()));
+                return f64::NAN;
+            }
+            cost
+        })
+    });
+    (intervals, lower.into_inner())
+}
+
+/// The least cost as a function of one parameter's value.
+type Along<'a> = Box<dyn FnMut(f64) -> f64 + 'a>;
+
+/// [`plain`], by profile where that differs. `along` is given a parameter and the rise that is looked for, and begins at the estimate.
+fn profiled<'a>(
+    problem: &Problem<'_>,
+    at: &Solution,
+    uncertainty: &Uncertainty,
+    fine: Fineness,
+    along: impl Fn(usize, f64) -> Along<'a>,
+) -> Intervals {
     let mut intervals = plain(problem, at, uncertainty);
-    let energy: f64 = search.energy.iter().sum();
-    let weights = at.weights.len() * problem.kinds.len();
     for (i, interval) in intervals.iter_mut().enumerate() {
         let Some(error) = uncertainty.errors[i] else { continue };
         let (value, (low, high)) = parameter(problem, at, i);
         let reach = uncertainty.reach[i] * error;
-        let at_end = is_at_end(problem, at, uncertainty, i);
-        let near_end =
-            i < weights && (value - low < 1.5 * reach || high - value < 1.5 * reach || is_capped(problem, at, i));
-        let lopsided = near_end && !problem.layout.is_empty() || i >= weights && reach > NARROW;
-        if low == high || !(lopsided || at_end) {
-            continue;
-        }
         let rise = reach * reach / uncertainty.bread[(i, i)];
-        if rise.is_nan() || rise <= RESOLVED * energy {
+        let is_resolved = rise.is_finite() && rise > fine.resolved;
+        if low == high || !is_resolved || !differs(problem, at, uncertainty, i) {
             continue;
         }
-        let profile = Profile { search, at, parameter: i, rise };
-        let (below, above) = ((value - reach).max(low).min(value), (value + reach).min(high).max(value));
-        *interval = Some((profile.end(value, below, low), profile.end(value, above, high)));
+        let end = |guess: f64, limit: f64| {
+            Profile { cost: along(i, rise), least: at.cost.max(0.0), rise, fine }.end(value, guess, limit)
+        };
+        let below = end((value - reach).max(low).min(value), low);
+        let above = end((value + reach).min(high).max(value), high);
+        *interval = below.zip(above).or(*interval);
     }
     intervals
+}
+
+/// Whether the profile of parameter `i` may differ from a parabola.
+fn differs(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty, i: usize) -> bool {
+    let (value, (low, high)) = parameter(problem, at, i);
+    let reach = uncertainty.reach[i] * uncertainty.errors[i].unwrap_or(0.0);
+    if i >= at.weights.len() * problem.kinds.len() {
+        return reach > NARROW || is_at_end(problem, at, uncertainty, i);
+    }
+    let near_end = value - low < 1.5 * reach || high - value < 1.5 * reach || is_capped(problem, at, i);
+    let straight = problem.layout.is_empty() && problem.is_transformable();
+    near_end && !straight
 }
 
 /// Whether the energy limit decides the channel that weight `i` belongs to.
@@ -87,70 +151,87 @@ fn parameter(problem: &Problem<'_>, at: &Solution, i: usize) -> (f64, (f64, f64)
     (at.t[i - weights], problem.bounds[i - weights])
 }
 
+/// The least cost with parameter `i` held at `value`, from the transforms.
+fn least_cost(search: &Search<'_>, at: &Solution, i: usize, value: f64) -> f64 {
+    let problem = search.problem;
+    let held = problem.holding(i, value);
+    let start = at.t.iter().zip(&held.bounds).map(|(t, (low, high))| t.clamp(*low, *high));
+    let start = DVector::from_iterator(at.t.len(), start);
+    let search = search.of(&held);
+    let options = SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() };
+    let lm = LevenbergMarquardt::new(options).with_bounds(held.bounds.clone());
+    solver::minimize(search.walk(), lm, start, 30).map_or(f64::NAN, |found| found.cost)
+}
+
+/// How finely ends are looked for.
+#[derive(Clone, Copy)]
+struct Fineness {
+    /// Least rise of the cost that can be told.
+    resolved: f64,
+    /// How far the root of the rise, over that of the wanted one, may be off 1.
+    tolerance: f64,
+    /// Steps outwards, and then inwards, at most.
+    tries: usize,
+}
+
 /// The cost along one parameter.
 struct Profile<'a> {
-    search: &'a Search<'a>,
-    at: &'a Solution,
-    parameter: usize,
+    cost: Along<'a>,
+    least: f64,
     /// Rise of the cost at the interval's ends.
     rise: f64,
+    fine: Fineness,
 }
 
 impl Profile<'_> {
     /// Rise of the cost with the parameter held at `value`, over the wanted one, less 1.
-    fn excess(&self, value: f64) -> f64 {
-        let problem = self.search.problem;
-        let lobes = problem.kinds.len();
-        let weights = self.at.weights.len() * lobes;
-        let mut held = problem.on(problem.samples);
-        let mut start = DVector::from_column_slice(&self.at.t);
-        if self.parameter < weights {
-            held.ranges[self.parameter / lobes][self.parameter % lobes] = (value, value);
-        } else {
-            held.bounds[self.parameter - weights] = (value, value);
-            start[self.parameter - weights] = value;
-        }
-        let search = self.search.of(&held);
-        let options = SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() };
-        let lm = LevenbergMarquardt::new(options).with_bounds(held.bounds.clone());
-        let found = solver::minimize(search.walk(), lm, start, 30);
-        found.map_or(f64::NAN, |f| (f.cost - self.at.cost.max(0.0)) / self.rise - 1.0)
+    fn excess(&mut self, value: f64) -> f64 {
+        ((self.cost)(value) - self.least) / self.rise - 1.0
     }
 
-    /// Where the profile has risen as wanted, between the estimate and `limit`; `guess` is where a parabola would have.
-    fn end(&self, value: f64, guess: f64, limit: f64) -> f64 {
+    /// Where the profile has risen as wanted, between the estimate and `limit`; `guess` is where a parabola would have. `None` where it can't be
+    /// followed as far.
+    fn end(&mut self, value: f64, guess: f64, limit: f64) -> Option<f64> {
         let mut step = guess - value;
         if step == 0.0 {
-            return value;
+            return Some(value);
         }
         let upwards = step > 0.0;
         let inside = |x: f64| if upwards { x.min(limit) } else { x.max(limit) };
-        let (mut near, mut far) = ((value, -1.0), value);
-        for _ in 0..STEPS {
-            far = inside(value + step);
+        let (mut near, mut growth) = ((value, -1.0), 1.6);
+        for _ in 0..self.fine.tries {
+            let far = inside(value + step);
             let excess = self.excess(far);
+            if excess.is_nan() {
+                return None;
+            }
             if excess >= 0.0 {
                 return self.root(near, (far, excess));
             }
-            if far == limit || excess.is_nan() {
-                return far;
+            if far == limit {
+                return Some(far);
             }
             near = (far, excess);
-            step *= 1.6;
+            // A loss whose slope is infinite at 0 has errors there that are far too small.
+            step *= growth;
+            growth *= 1.1;
         }
-        far
+        None
     }
 
     /// The root between two points of opposite sign, by the Illinois variant of regula falsi on √(excess + 1), which is nearly a
     /// straight line.
-    fn root(&self, a: (f64, f64), b: (f64, f64)) -> f64 {
+    fn root(&mut self, a: (f64, f64), b: (f64, f64)) -> Option<f64> {
         let line = |(x, e): (f64, f64)| (x, (e + 1.0).max(0.0).sqrt() - 1.0);
         let (mut a, mut b) = (line(a), line(b));
-        for _ in 0..STEPS {
+        for _ in 0..self.fine.tries {
+            if b.1.abs() < self.fine.tolerance {
+                return Some(b.0);
+            }
             let x = b.0 - b.1 * (b.0 - a.0) / (b.1 - a.1);
             let e = line((x, self.excess(x))).1;
-            if e.abs() < 1e-4 || !x.is_finite() {
-                return x;
+            if e.is_nan() {
+                return None;
             }
             if e * b.1 < 0.0 {
                 a = b;
@@ -159,6 +240,6 @@ impl Profile<'_> {
             }
             b = (x, e);
         }
-        b.0
+        Some(b.0)
     }
 }

@@ -19,10 +19,12 @@ const MOST: usize = 60;
 const CLEARLY_POSITIVE: f64 = 1e-9;
 
 /// How far a descent goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Digits {
     /// Until the cost hardly tells points apart.
     Rough,
+    /// Until the cost is known to this share of it, never by the Jacobian.
+    Cost(f64),
     /// To the last.
     All,
 }
@@ -44,15 +46,17 @@ pub(super) fn polish(
 ) -> Option<Result<(Solution, Outcome), Error>> {
     let (channels, lobes) = (start.weights.len(), problem.kinds.len());
     let parameters = channels * lobes + problem.layout.len();
-    let capped = (0..channels).any(|c| problem.feasible(c).free_at(&start.weights[c]).1);
-    if capped || parameters > MOST {
+    let only_cost = matches!(digits, Digits::Cost(_));
+    let capped = |c: usize| problem.feasible(c).free_at(&start.weights[c]).1;
+    if !is_small(problem) || only_cost && problem.cap.is_some() || (0..channels).any(capped) {
         return None;
     }
-    let dense = problem.samples.residuals() * parameters <= LARGEST;
+    let dense = !only_cost && problem.samples.residuals() * parameters <= LARGEST;
     let joint = Joint { problem, dense };
     let ranges = problem.ranges.iter().flatten().chain(&problem.bounds).copied().collect();
     let (ftol, polish) = match digits {
         Digits::Rough => (1e-9, 0),
+        Digits::Cost(share) => (share, 0),
         // On large tables a step takes a pass, and Newton's doubles the digits.
         Digits::All => (1e-15, if dense { 60 } else { 12 }),
     };
@@ -61,6 +65,11 @@ pub(super) fn polish(
     let p = start.weights.iter().flat_map(|x| x.iter().copied()).chain(start.t.iter().copied());
     let found = solver::minimize(&joint, lm, DVector::from_iterator(parameters, p), steps);
     Some(found.map(|outcome| (joint.solution(&outcome.parameters, outcome.cost), outcome)))
+}
+
+/// Whether the parameters are few enough to be searched together.
+pub(super) fn is_small(problem: &Problem<'_>) -> bool {
+    problem.ranges.len() * problem.kinds.len() + problem.layout.len() <= MOST
 }
 
 impl Joint<'_> {

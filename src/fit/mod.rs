@@ -26,6 +26,7 @@ mod options;
 mod outliers;
 mod part;
 mod passes;
+mod profile;
 mod quadratic;
 mod record;
 mod reduced;

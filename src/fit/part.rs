@@ -15,7 +15,7 @@ use super::quadratic;
 use super::reduced::{Problem, Search, Solution, Streamed, polish};
 use super::robust;
 use super::samples::{self, Samples, Transforms};
-use super::solver::{self, Iteration, LevenbergMarquardt, Stop};
+use super::solver::{self, Iteration, LevenbergMarquardt, SolverOptions, Stop};
 use super::start::{self, SearchReport};
 use super::structure::{self, Structure};
 use crate::brdf::{ModelSpec, Parameter};
@@ -95,7 +95,7 @@ const LOST_CONDITION: f64 = 1e8;
 pub(super) const SMALL: usize = 200_000;
 
 /// An rmse below this, in the fit's scale, is rounding: nothing can be said of its structure.
-const ROUNDING: f64 = 1e-13;
+pub(super) const ROUNDING: f64 = 1e-13;
 
 /// Fits the samples.
 pub(super) fn fit(
@@ -133,7 +133,7 @@ pub(super) fn refit(
         let found = solver::minimize(search.walk(), lm, start, options.max_iterations).map_err(failed)?;
         return Ok(search.solve(found.parameters.as_slice()));
     }
-    Ok(descend_shapes(&problem, &like.solution, options.max_iterations)?.0)
+    Ok(descend_shapes(&problem, &like.solution, options.max_iterations, Digits::All)?.0)
 }
 
 /// A loss that is linear in the weights, without outliers: everything from the transforms, last digits from true residuals.
@@ -148,7 +148,7 @@ fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Part, FitError
     let mut uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments));
     identify::by_search(search, &solution, &mut uncertainty);
     solution.cost = uncertainty.cost;
-    let intervals = intervals::profiled(search, &solution, &uncertainty);
+    let intervals = intervals::by_search(search, &solution, &uncertainty);
     finish(search.problem, solution, uncertainty, intervals, found)
 }
 
@@ -212,15 +212,44 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
             robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
         found.report = start::SearchReport::default();
     }
-    let (solution, outcome) = descend(&problem, &solution, options.max_iterations, Digits::All)?;
-    found.outcome = outcome;
-    let mut uncertainty = covariance::uncertainty(&problem, &solution, None);
+    let mut judged = judge(&problem, &more, &solution, options)?;
+    for _ in 0..VALLEYS {
+        let Some(lower) = judged.lower.take() else { break };
+        (solution, unsettled) = robust::resettle(&mut problem, lower, options)?;
+        judged = judge(&problem, &more, &solution, options)?;
+    }
+    found.outcome = judged.outcome;
+    Ok(Part { unsettled, ..finish(&problem, judged.solution, judged.uncertainty, judged.intervals, found)? })
+}
+
+/// Valleys that a fit moves on to at most, each lower than the last, when the profile of a parameter meets them.
+const VALLEYS: usize = 4;
+
+/// A minimum, and how sure it is.
+struct Judged {
+    solution: Solution,
+    outcome: solver::Outcome,
+    uncertainty: Uncertainty,
+    intervals: Intervals,
+    /// A point of another valley that is lower.
+    lower: Option<Solution>,
+}
+
+/// The minimum next to a solution and what there is to say of it; `more` is the same problem on a part of the samples.
+fn judge(
+    problem: &Problem<'_>,
+    more: &Problem<'_>,
+    start: &Solution,
+    options: &FitOptions,
+) -> Result<Judged, FitError> {
+    let (solution, outcome) = descend(problem, start, options.max_iterations, Digits::All)?;
+    let mut uncertainty = covariance::uncertainty(problem, &solution, None);
     let mut part = problem.on(more.samples);
     part.saturation = problem.saturation;
     identify::by_passes(&part, &solution, &mut uncertainty);
     let solution = Solution { cost: uncertainty.cost, ..solution };
-    let intervals = intervals::plain(&problem, &solution, &uncertainty);
-    Ok(Part { unsettled, ..finish(&problem, solution, uncertainty, intervals, found)? })
+    let (intervals, lower) = intervals::by_passes(problem, &solution, &uncertainty);
+    Ok(Judged { solution, outcome, uncertainty, intervals, lower })
 }
 
 /// The minimum next to a solution, on all samples, to its last digits or roughly.
@@ -237,7 +266,7 @@ pub(super) fn descend(
         outcome.history.iter_mut().for_each(|step| drop(step.parameters.drain(..weights)));
         return Ok((solution, outcome));
     }
-    descend_shapes(problem, start, steps)
+    descend_shapes(problem, start, steps, digits)
 }
 
 /// The minimum next to a solution by the shapes alone, the weights following.
@@ -245,9 +274,14 @@ fn descend_shapes(
     problem: &Problem<'_>,
     start: &Solution,
     steps: u64,
+    digits: Digits,
 ) -> Result<(Solution, solver::Outcome), FitError> {
     let streamed = Streamed::from(problem, start.clone());
-    let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
+    let options = match digits {
+        Digits::Cost(ftol) => SolverOptions { ftol, polish: 0, ..SolverOptions::default() },
+        Digits::Rough | Digits::All => SolverOptions::default(),
+    };
+    let lm = LevenbergMarquardt::new(options).with_bounds(problem.bounds.clone());
     let outcome = solver::minimize(&streamed, lm, DVector::from_column_slice(&start.t), steps).map_err(failed)?;
     Ok((streamed.solve(outcome.parameters.as_slice()), outcome))
 }

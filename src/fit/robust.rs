@@ -45,9 +45,24 @@ pub(super) fn settle(
     let at = if other.cost < plain.cost { other } else { plain };
     let whole = more.samples.len() == problem.samples.len();
     let at = if whole { at } else { follow(&mut more, at, robust, steps, SETTLED_PART)?.0 };
-    let small = problem.samples.residuals() <= SMALL;
     problem.saturation = more.saturation;
-    follow(problem, at, robust, steps, if small { SETTLED } else { SETTLED_LARGE })
+    follow(problem, at, robust, steps, settled(problem))
+}
+
+/// As [`settle`], from a point and an s near the answer's; the point alone where the loss is not robust.
+pub(super) fn resettle(
+    problem: &mut Problem<'_>,
+    near: Solution,
+    options: &FitOptions,
+) -> Result<(Solution, Option<f64>), FitError> {
+    let Some(robust) = options.robust else { return Ok((near, None)) };
+    let at = descend(problem, &near, options.max_iterations, Digits::Rough)?.0;
+    follow(problem, at, robust, options.max_iterations, settled(problem))
+}
+
+/// Relative change at which s has settled on all samples.
+fn settled(problem: &Problem<'_>) -> f64 {
+    if problem.samples.residuals() <= SMALL { SETTLED } else { SETTLED_LARGE }
 }
 
 /// Brings ln(new s) − ln(old s) to 0 by secants, within the bracket that is known; the parameters follow. Says what is

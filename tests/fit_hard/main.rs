@@ -11,6 +11,7 @@ mod hard;
 mod invariance;
 mod narrow;
 mod optimum;
+mod profile;
 mod properties;
 mod recovery;
 mod reference;

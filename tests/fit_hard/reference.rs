@@ -142,6 +142,20 @@ impl Reference {
         g.iter().zip(a.iter()).map(|(g, a)| if *a > 0.0 { g / (a * energy).sqrt() } else { 0.0 }).collect()
     }
 
+    /// A = Σ w J Jᵀ, robust: Σ w (ρ′ + 2uρ″) J Jᵀ; exponents by ln n.
+    pub fn normal(&self, p: &[f64], robust: Option<(RobustKind, f64)>) -> DMatrix<f64> {
+        let mut a = DMatrix::zeros(p.len(), p.len());
+        for v in &self.values {
+            let (r, j) = (self.residual(p, v), self.jacobian(p, v));
+            let growth = |(kind, s): (RobustKind, f64)| match (kind, (r / s).powi(2)) {
+                (RobustKind::Huber, u) => f64::from(u <= 1.0),
+                (RobustKind::Cauchy, u) => (1.0 - u) / (1.0 + u).powi(2),
+            };
+            a += v.w * robust.map_or(1.0, growth) * &j * j.transpose();
+        }
+        a
+    }
+
     /// Standard errors, exponents in their own unit: √diag A⁻¹ (B + Σ g gᵀ) A⁻¹.
     pub fn errors(&self, m: &Measurement, p: &[f64]) -> Vec<f64> {
         let k = p.len();
