@@ -198,22 +198,16 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     };
     let (few, more) = (thinned(FIRST_SAMPLES), thinned(START_SAMPLES));
     let (few, more, mut problem) = (problem.on(&few), problem.on(&more), problem.on(samples));
-    let mut found = if problem.is_transformable() {
-        // Outliers aside the loss is linear: its plain fit is quick.
-        let (transform, energy) = passes::transform(problem.samples);
-        start::search(&Search::new(&problem, &transform, &energy), options.max_iterations)?
-    } else {
-        start::search_streamed(&few, &more, options.max_iterations)?
-    };
+    let mut found = start::search_plain(&problem, (&few, &more), options.max_iterations)?;
     let mut solution = Streamed::new(&problem).solve(found.outcome.parameters.as_slice());
-    let mut unsettled = None;
+    let mut met = true;
     if options.robust.is_some() {
-        (solution, unsettled) =
-            robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
+        (solution, met) = robust::settle(&mut problem, (&few, &more), solution, options)?;
         found.report = start::SearchReport::default();
     }
     let (solution, outcome) = descend(&problem, &solution, options.max_iterations, Digits::All)?;
     found.outcome = outcome;
+    let unsettled = if met { None } else { robust::left(&problem, &solution, options) };
     let mut uncertainty = covariance::uncertainty(&problem, &solution, None);
     let mut part = problem.on(more.samples);
     part.saturation = problem.saturation;
@@ -246,7 +240,7 @@ fn descend_shapes(
     start: &Solution,
     steps: u64,
 ) -> Result<(Solution, solver::Outcome), FitError> {
-    let streamed = Streamed::from(problem, start.clone());
+    let streamed = Streamed::new(problem).starting_at(start);
     let lm = LevenbergMarquardt::bounded(problem.bounds.clone());
     let outcome = solver::minimize(&streamed, lm, DVector::from_column_slice(&start.t), steps).map_err(failed)?;
     Ok((streamed.solve(outcome.parameters.as_slice()), outcome))

@@ -390,6 +390,8 @@ pub(super) struct Streamed<'a> {
 const INNER_STEPS: usize = 60;
 const INNER_TOLERANCE: f64 = 1e-15;
 const ROUGH_TOLERANCE: f64 = 1e-7;
+/// Weight of every lobe, in the samples' scale, where the inner iteration begins: not 0, for slopes there may be infinite.
+const FIRST_WEIGHT: f64 = 0.1;
 
 impl<'a> Streamed<'a> {
     pub fn new(problem: &'a Problem<'a>) -> Self {
@@ -402,8 +404,8 @@ impl<'a> Streamed<'a> {
     }
 
     /// Starting at weights known from elsewhere.
-    pub fn from(problem: &'a Problem<'a>, start: Solution) -> Self {
-        Self { last: RefCell::new(Some(Solution { t: Vec::new(), ..start })), ..Self::new(problem) }
+    pub fn starting_at(self, weights: &Solution) -> Self {
+        Self { last: RefCell::new(Some(Solution { t: Vec::new(), ..weights.clone() })), ..self }
     }
 
     /// The weights that minimise the cost at `t`.
@@ -413,23 +415,19 @@ impl<'a> Streamed<'a> {
             return known.clone();
         }
         let lobes = self.problem.shaped(t);
-        let start = last.map_or_else(|| self.first_weights(&lobes), |s| s.weights);
+        let start = last.map_or_else(|| self.first_weights(), |s| s.weights);
         let solution = self.descend(t, lobes, start);
         *self.last.borrow_mut() = Some(solution.clone());
         solution
     }
 
-    /// Weights to begin with: those of the plain linear problem; at least a trace of each, for slopes at 0 may be infinite.
-    fn first_weights(&self, lobes: &[ShapedLobe]) -> Vec<DVector<f64>> {
-        let guess = DVector::from_element(lobes.len(), 0.1);
-        (0..self.problem.samples.channels.len())
-            .map(|c| {
-                let range = |i: usize| self.problem.ranges[c][i];
-                let cap = self.problem.cap.unwrap_or(f64::INFINITY);
-                let clamp = |i: usize, v: f64| v.min(cap / lobes.len() as f64).clamp(range(i).0, range(i).1);
-                DVector::from_fn(lobes.len(), |i, _| clamp(i, guess[i]))
-            })
-            .collect()
+    /// Weights to begin with: [`FIRST_WEIGHT`] each, where the ranges and the cap let it be.
+    fn first_weights(&self) -> Vec<DVector<f64>> {
+        let lobes = self.problem.kinds.len();
+        let share = self.problem.cap.map_or(FIRST_WEIGHT, |cap| FIRST_WEIGHT.min(cap / lobes as f64));
+        let within = |range: &(f64, f64)| share.clamp(range.0, range.1);
+        let channel = |ranges: &Vec<(f64, f64)>| DVector::from_iterator(lobes, ranges.iter().map(within));
+        self.problem.ranges.iter().map(channel).collect()
     }
 
     fn descend(&self, t: &[f64], lobes: Vec<ShapedLobe>, start: Vec<DVector<f64>>) -> Solution {

@@ -14,5 +14,6 @@ mod optimum;
 mod properties;
 mod recovery;
 mod reference;
+mod robust;
 mod said;
 mod support;
