@@ -1,5 +1,13 @@
 //! Passes over the samples: each returns a few dozen sums, however many samples there are. Sums run in blocks of fixed size,
 //! in a fixed order, so they do not depend on the number of threads.
+//!
+//! Sums come in two kinds, each in two ways:
+//! - *Transforms* ([`transform`]), of a linear loss's weights and weighted data, from which every cost follows without another pass: sorted
+//!   into bins of the coordinate ([`Bins`]); or, where the samples are listed in one block and so few that adding them up takes no longer than
+//!   the bins would, kept one by one. A MERL table whose one or three channels share a mask has its bins filled from folded lines as its
+//!   samples are gathered.
+//! - *True residuals* ([`sums`]), at given shapes and weights, for last digits, other losses and robust ones: block by block; or, for a
+//!   linear loss on a MERL table that is not listed, line by line, folded about φd = 90°.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -243,7 +251,8 @@ fn line_sums(
     zero: &Sums,
 ) -> Option<Vec<Vec<Sums>>> {
     let columns = zero.gradient.len();
-    let start = || (Residuals::default(), vec![(OnLines::default(), Tallied::new(columns)); weights.len()]);
+    let tallied = || if zero.normal.is_empty() { Tallied::gradient(columns) } else { Tallied::new(columns) };
+    let start = || (Residuals::default(), vec![(OnLines::default(), tallied()); weights.len()]);
     let on_lines = |(residuals, sums): &mut (Residuals, Vec<_>), lines: &MerlLines, block: &[Line]| {
         for line in block {
             residuals.set(lines, line, samples, lobes);
@@ -254,9 +263,8 @@ fn line_sums(
         }
     };
     let total = |(found, tallied): &(OnLines, Tallied)| {
-        let mut sums = Sums { cost: found.cost(), normal: DMatrix::zeros(columns, columns), ..zero.clone() };
+        let mut sums = Sums { cost: found.cost(), ..zero.clone() };
         tallied.add_to(&mut sums.gradient, &mut sums.normal);
-        sums.normal.resize_mut(zero.normal.nrows(), zero.normal.nrows(), 0.0);
         sums
     };
     let parts = samples.map_lines(start, on_lines)?;
@@ -375,9 +383,9 @@ struct Evaluate<'a> {
     out: Out<'a>,
 }
 
-/// r and ∂r/∂f from f, cosθi, the gain of a linear loss and y. A trait, so that each loss has loops of its own, inlined into the kernel.
+/// A loss by its type, so that each has loops of its own, inlined into the kernel.
 trait Residual {
-    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64);
+    const LOSS: Loss;
 }
 
 /// s²ρ and ρ′ of a residual.
@@ -390,24 +398,15 @@ struct Log;
 struct CubeRoot;
 
 impl Residual for Plain {
-    #[inline(always)]
-    fn at(f: f64, _cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
-        (gain * (f - y), gain)
-    }
+    const LOSS: Loss = Loss::L2; // as any linear loss, by its gain
 }
 
 impl Residual for Log {
-    #[inline(always)]
-    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
-        Loss::Log.evaluate(f, cos_i, gain, y)
-    }
+    const LOSS: Loss = Loss::Log;
 }
 
 impl Residual for CubeRoot {
-    #[inline(always)]
-    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
-        Loss::CubeRoot.evaluate(f, cos_i, gain, y)
-    }
+    const LOSS: Loss = Loss::CubeRoot;
 }
 
 #[derive(Clone, Copy)]
@@ -473,7 +472,7 @@ impl Evaluate<'_> {
         let (r, slope, trust, pull) =
             (&mut self.out.r[..n], &mut self.out.slope[..n], &mut self.out.trust[..n], &mut self.out.pull[..n]);
         for i in 0..n {
-            (r[i], slope[i]) = R::at(f[i], cos_i[i], slope[i], y[i]);
+            (r[i], slope[i]) = R::LOSS.evaluate(f[i], cos_i[i], slope[i], y[i]);
         }
         for i in 0..n {
             // The cost waits where the pull will stand.
