@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 pub(in crate::fit) use block::Block;
-use block::{Values, neighbours};
+use block::{Values, neighbours, next_on_line};
 use select::{Judge, Left, least_cos};
 pub(in crate::fit) use select::{Thin, offset};
 
@@ -334,7 +334,7 @@ impl<'a> Samples<'a> {
         all.w.iter_mut().flatten().for_each(|w| *w /= largest);
         match &self.measurement.directions {
             Directions::List { wi, wo } => all = all.neighbours_together(wi, wo),
-            Directions::Merl(_) => all.pairs = neighbours(&all.index, |a, b| b == a + 1),
+            Directions::Merl(_) => all.pairs = neighbours(&all.index, next_on_line),
         }
         self.source = Source::Listed(all);
         Ok(())
