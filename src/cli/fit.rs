@@ -449,7 +449,7 @@ fn evidence(record: &FitRecord, material: &Material) -> String {
         say(format!("residuals: noise {noise}{unit} ({from}), {model}; worth {worth:.0} independent values"));
     }
     if let Some(e) = &record.energy {
-        say(format!("energy: reflects {:.1} % of the light at most", 100.0 * e.largest));
+        say(format!("energy: reflects {} of the light at most", percent(e.largest)));
     }
     // A single shape is bracketed over its whole range: nothing to add unless another minimum is nearly as low.
     if let Some(s) =
