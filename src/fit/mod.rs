@@ -130,6 +130,7 @@ fn fit_part(
     }
     let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin::NONE)?;
     let mut part = part::fit(&samples, transforms, model, ranges, options)?;
-    part.bootstrap = bootstrap::bootstrap(&samples, &part, model, ranges, options)?;
+    part.bootstrap =
+        bootstrap::bootstrap(bootstrap::listed(&samples, options).as_ref(), &part, model, ranges, options)?;
     Ok(part)
 }
