@@ -3,8 +3,9 @@
 use nalgebra::DVector;
 
 use super::covariance::{Uncertainty, pinned};
-use super::reduced::{Problem, Search, Solution, Streamed};
+use super::reduced::{Problem, Search, Solution};
 use super::solver::{self, LevenbergMarquardt, SolverOptions};
+use super::streamed::Streamed;
 use crate::numeric::stats::chi_square_quantile;
 
 /// Cost that a difference of sums does not resolve, as a share of the data's energy.

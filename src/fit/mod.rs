@@ -24,16 +24,20 @@ mod offset;
 mod options;
 mod part;
 mod passes;
+mod powers;
 mod quadratic;
 mod record;
 mod reduced;
+mod residuals;
 mod robust;
 mod samples;
 pub mod solver;
 mod start;
+mod streamed;
 mod structure;
 mod tally;
 mod transform;
+mod walk;
 
 use std::time::{Duration, Instant};
 

@@ -12,11 +12,12 @@ use super::offset;
 use super::options::{FitError, FitOptions};
 use super::passes::{self, Saturation};
 use super::quadratic;
-use super::reduced::{Problem, Search, Solution, Streamed, polish};
+use super::reduced::{Problem, Search, Solution, polish};
 use super::robust;
 use super::samples::{self, Samples, Transforms};
 use super::solver::{self, Iteration, LevenbergMarquardt, Stop};
 use super::start::{self, SearchReport};
+use super::streamed::Streamed;
 use super::structure::{self, Structure};
 use crate::brdf::{ModelSpec, Parameter};
 

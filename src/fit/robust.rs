@@ -11,8 +11,9 @@ use super::loss::Robust;
 use super::options::{FitError, FitOptions};
 use super::part::{SMALL, descend};
 use super::passes::{Saturation, Scratch};
-use super::reduced::{Problem, Solution, Streamed};
+use super::reduced::{Problem, Solution};
 use super::start;
+use super::streamed::Streamed;
 
 /// Rounds in which s settles at most.
 const ROUNDS: usize = 60;
@@ -89,7 +90,7 @@ impl Settling {
 
     /// Where to begin, from the parts of the samples: from the plain fit, or from the model with a lobe fewer.
     fn begin(&self, few: &Problem<'_>, more: &Problem<'_>, plain: Solution) -> Result<Settled, FitError> {
-        let own = self.from_plain(few, more, plain)?;
+        let own = self.after_plain(few, more, plain)?;
         let Some(smaller) = self.smaller(few, more)? else { return Ok(own) };
         // Outliers may hold the plain fit of many lobes where that of few lets them go.
         let at = with_a_lobe_more(more, &smaller);
@@ -98,7 +99,7 @@ impl Settling {
     }
 
     /// Beginning with the plain fit and its s.
-    fn from_plain(&self, few: &Problem<'_>, more: &Problem<'_>, plain: Solution) -> Result<Settled, FitError> {
+    fn after_plain(&self, few: &Problem<'_>, more: &Problem<'_>, plain: Solution) -> Result<Settled, FitError> {
         let (mut few, mut more) = (few.on(few.samples), more.on(more.samples));
         let saturation = Some((self.robust.kind, self.asked(&more, &plain)));
         (few.saturation, more.saturation) = (saturation, saturation);

@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use super::options::FitError;
 use super::passes::{self, ShapedLobe};
 use super::quadratic::{Feasible, Quadratic};
-use super::reduced::{Problem, Search, Streamed};
+use super::reduced::{Problem, Search};
 use super::solver::{self, LevenbergMarquardt, Linearize, Outcome, SolverOptions};
+use super::streamed::Streamed;
 use crate::brdf::MAX_LOBES;
 use crate::numeric::random::{Purpose, RngExt, stream};
 
