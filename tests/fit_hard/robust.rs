@@ -89,7 +89,7 @@ fn a_lobe_more_is_never_worse_than_the_robust_fit_that_it_contains() {
     assert!(all[0].0 < WORSE, "{all:?}");
 }
 
-/// The larger model's parameters are best at its own s, which differs by a tenth.
+/// What a descent leaves undone, as a share of the cost.
 const WORSE: f64 = 1e-6;
 
 /// Fifteen values drawn as squares of random numbers, a scale far below the noise: no s is the one that its own fit's residuals ask for.
