@@ -13,21 +13,25 @@ use super::samples::Samples;
 use crate::brdf::ModelSpec;
 use crate::numeric::random::{Purpose, stream};
 
+/// What is redrawn, where that is asked for: all samples, in one list.
+pub(super) fn listed<'a>(samples: &Samples<'a>, options: &FitOptions) -> Option<Samples<'a>> {
+    options.bootstrap.map(|_| samples.listed(|_| true))
+}
+
 /// Standard deviation of every parameter over the redrawn data, where that is asked for.
 pub(super) fn bootstrap(
-    samples: &Samples<'_>,
+    listed: Option<&Samples<'_>>,
     part: &Part,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
 ) -> Result<Option<Vec<f64>>, FitError> {
-    let Some(draws) = options.bootstrap else { return Ok(None) };
-    let all = samples.listed(|_| true);
+    let Some((draws, all)) = options.bootstrap.zip(listed) else { return Ok(None) };
     let parameters = part.uncertainty.errors.len();
     let (mut sum, mut squares) = (DVector::<f64>::zeros(parameters), DVector::<f64>::zeros(parameters));
     let centre = flat(&part.solution);
     for replicate in 0..draws.replicates {
-        let redrawn = redrawn(&all, draws.seed, replicate)?;
+        let redrawn = redrawn(all, draws.seed, replicate)?;
         let solution = part::refit(&redrawn, part, model, ranges, options)?;
         let moved = flat(&solution) - &centre;
         squares += moved.component_mul(&moved);
@@ -40,16 +44,15 @@ pub(super) fn bootstrap(
 
 /// How long that would take, by the time of the first replicate.
 pub(super) fn predicted(
-    samples: &Samples<'_>,
+    listed: Option<&Samples<'_>>,
     part: &Part,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
 ) -> Result<Duration, FitError> {
-    let Some(draws) = options.bootstrap else { return Ok(Duration::ZERO) };
-    let all = samples.listed(|_| true);
+    let Some((draws, all)) = options.bootstrap.zip(listed) else { return Ok(Duration::ZERO) };
     let began = Instant::now();
-    part::refit(&redrawn(&all, draws.seed, 0)?, part, model, ranges, options)?;
+    part::refit(&redrawn(all, draws.seed, 0)?, part, model, ranges, options)?;
     Ok(began.elapsed() * draws.replicates)
 }
 

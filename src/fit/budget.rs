@@ -65,12 +65,13 @@ pub(super) fn fit(
         let (samples, transforms) = gathered?;
         let mut part = part::fit(&samples, transforms, model, ranges, options)?;
         let round = began.elapsed();
+        let listed = bootstrap::listed(&samples, options);
         if thin > 1 {
             let mut subset = Subset::of(&part, thin);
             let met = options.target_rmse_excess.is_some_and(|target| subset.excess_95 <= target);
             let (next, longer) = if whole_is_quick { (1, WHOLE) } else { next(thin) };
             if let Some(time) = time.filter(|_| !met) {
-                let drawings = bootstrap::predicted(&samples, &part, model, ranges, options)?;
+                let drawings = bootstrap::predicted(listed.as_ref(), &part, model, ranges, options)?;
                 let needed = round.mul_f64(longer) + drawings.mul_f64(thin as f64 / next as f64);
                 subset.out_of_time = !fits(time, clock.elapsed() + needed);
             }
@@ -80,7 +81,7 @@ pub(super) fn fit(
             }
             part.subset = Some(subset);
         }
-        part.bootstrap = bootstrap::bootstrap(&samples, &part, model, ranges, options)?;
+        part.bootstrap = bootstrap::bootstrap(listed.as_ref(), &part, model, ranges, options)?;
         return Ok(part);
     }
 }

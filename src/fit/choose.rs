@@ -1,6 +1,7 @@
 //! Which model? Candidates compared by the error on directions that they were not fitted to.
 
 use std::fmt::Write;
+use std::time::Instant;
 
 use super::limits::{Limit, Ranges};
 use super::options::{FitError, FitOptions};
@@ -28,11 +29,12 @@ const ROUNDING: f64 = 1e-13;
 const AS_GOOD: f64 = 0.01;
 
 /// Compares all models and fits the simplest one whose held-out error is as good as the best's. `options.model` is not looked at. A limit
-/// concerns the models that have its parameter.
+/// concerns the models that have its parameter. The comparison takes its time out of the budget, and the fit has what is left.
 ///
 /// # Errors
 /// As [`fit`]; a limit that concerns no model.
 pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
+    let clock = Instant::now();
     options.validate(measurement)?;
     let models = models(measurement, options)?;
     for limit in &options.limits {
@@ -43,8 +45,10 @@ pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result
     let model = choice.chosen.parse().map_err(|_| FitError::Solver { reason: "no model was chosen".into() })?;
     let (limits, idle): (Vec<Limit>, Vec<Limit>) =
         options.limits.iter().cloned().partition(|limit| concerns(limit, &model, measurement));
-    let mut fitted = fit(measurement, &FitOptions { model, limits, ..options.clone() })?;
+    let time_budget = options.time_budget.map(|budget| budget.saturating_sub(clock.elapsed()));
+    let mut fitted = fit(measurement, &FitOptions { model, limits, time_budget, ..options.clone() })?;
     if let Some(record) = &mut fitted.material.fit {
+        record.seconds = clock.elapsed().as_secs_f64();
         let said = idle.iter().map(|limit| format!("{limit} limits nothing: {} has no such parameter", choice.chosen));
         record.warnings.extend(said);
         record.choice = Some(choice);

@@ -80,7 +80,7 @@ struct ChannelSums {
 }
 
 /// What a piece of the samples adds.
-struct Part {
+struct Piece {
     channels: Vec<ChannelSums>,
     /// Σ over clusters of neighbours of the outer product of their pull on the parameters.
     clusters: DMatrix<f64>,
@@ -97,12 +97,12 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let pinned = pinned(problem, channels);
     let freedom = n as f64 - pinned.iter().filter(|p| !**p).count() as f64;
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
-    let start = || Part::new(problem, at);
-    let add = |part: &mut Part, block: &Block| part.add(problem, at, block, moments.is_none());
-    let add_lines = |part: &mut Part, lines: &MerlLines, block: &[Line]| part.add_lines(problem, at, lines, block);
+    let start = || Piece::new(problem, at);
+    let add = |part: &mut Piece, block: &Block| part.add(problem, at, block, moments.is_none());
+    let add_lines = |part: &mut Piece, lines: &MerlLines, block: &[Line]| part.add_lines(problem, at, lines, block);
     let folded = moments.and_then(|_| samples.map_lines(start, add_lines));
     let mut parts = folded.unwrap_or_else(|| samples.map_pieces(start, add));
-    parts.iter_mut().for_each(Part::close);
+    parts.iter_mut().for_each(Piece::close);
 
     let has_sigma = samples.measurement.sigma.is_some() && problem.saturation.is_none();
     let (mut normal, mut known) = (DMatrix::zeros(parameters, parameters), DMatrix::zeros(parameters, parameters));
@@ -251,7 +251,7 @@ impl Sandwich {
     }
 }
 
-impl Part {
+impl Piece {
     fn new(problem: &Problem<'_>, at: &Solution) -> Self {
         let (channels, k) = (at.weights.len(), problem.kinds.len() + problem.layout.len());
         let parameters = channels * problem.kinds.len() + problem.layout.len();

@@ -3,8 +3,9 @@
 use nalgebra::DVector;
 
 use super::covariance::{Uncertainty, pinned};
-use super::reduced::{Problem, Search, Solution, Streamed};
+use super::reduced::{Problem, Search, Solution};
 use super::solver::{self, LevenbergMarquardt, SolverOptions};
+use super::streamed::Streamed;
 use crate::numeric::stats::chi_square_quantile;
 
 /// Cost that a difference of sums does not resolve, as a share of the data's energy.
@@ -27,7 +28,7 @@ pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &mut Un
 /// Marks what the data leave open, by passes over `part`, the same problem on few samples.
 pub(super) fn by_passes(part: &Problem<'_>, at: &Solution, uncertainty: &mut Uncertainty) {
     let cost = |held: &Problem<'_>, t: Vec<f64>| {
-        let streamed = Streamed::from(held, at.clone());
+        let streamed = Streamed::new(held).starting_at(at);
         let lm = LevenbergMarquardt::new(options()).with_bounds(held.bounds.clone());
         solver::minimize(&streamed, lm, DVector::from_vec(t), 30).map_or(f64::INFINITY, |found| found.cost)
     };

@@ -26,17 +26,21 @@ mod options;
 mod outliers;
 mod part;
 mod passes;
+mod powers;
 mod profile;
 mod quadratic;
 mod record;
 mod reduced;
+mod residuals;
 mod robust;
 mod samples;
 pub mod solver;
 mod start;
+mod streamed;
 mod structure;
 mod tally;
 mod transform;
+mod walk;
 
 use std::time::{Duration, Instant};
 
@@ -133,6 +137,7 @@ fn fit_part(
     }
     let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin::NONE)?;
     let mut part = part::fit(&samples, transforms, model, ranges, options)?;
-    part.bootstrap = bootstrap::bootstrap(&samples, &part, model, ranges, options)?;
+    part.bootstrap =
+        bootstrap::bootstrap(bootstrap::listed(&samples, options).as_ref(), &part, model, ranges, options)?;
     Ok(part)
 }

@@ -12,11 +12,12 @@ use super::offset;
 use super::options::{FitError, FitOptions};
 use super::passes::{self, Saturation};
 use super::quadratic;
-use super::reduced::{Problem, Search, Solution, Streamed, polish};
+use super::reduced::{Problem, Search, Solution, polish};
 use super::robust;
 use super::samples::{self, Samples, Transforms};
 use super::solver::{self, Iteration, LevenbergMarquardt, SolverOptions, Stop};
 use super::start::{self, SearchReport};
+use super::streamed::Streamed;
 use super::structure::{self, Structure};
 use crate::brdf::{ModelSpec, Parameter};
 
@@ -198,26 +199,20 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     };
     let (few, more) = (thinned(FIRST_SAMPLES), thinned(START_SAMPLES));
     let (few, more, mut problem) = (problem.on(&few), problem.on(&more), problem.on(samples));
-    let mut found = if problem.is_transformable() {
-        // Outliers aside the loss is linear: its plain fit is quick.
-        let (transform, energy) = passes::transform(problem.samples);
-        start::search(&Search::new(&problem, &transform, &energy), options.max_iterations)?
-    } else {
-        start::search_streamed(&few, &more, options.max_iterations)?
-    };
+    let mut found = start::search_plain(&problem, (&few, &more), options.max_iterations)?;
     let mut solution = Streamed::new(&problem).solve(found.outcome.parameters.as_slice());
-    let mut unsettled = None;
+    let mut met = true;
     if options.robust.is_some() {
-        (solution, unsettled) =
-            robust::settle(&mut problem, (few.on(few.samples), more.on(more.samples)), solution, options)?;
+        (solution, met) = robust::settle(&mut problem, (&few, &more), solution, options)?;
         found.report = start::SearchReport::default();
     }
     let mut judged = judge(&problem, &more, &solution, options)?;
     for _ in 0..VALLEYS {
         let Some(lower) = judged.lower.take() else { break };
-        (solution, unsettled) = robust::resettle(&mut problem, lower, options)?;
+        (solution, met) = robust::resettle(&mut problem, lower, options)?;
         judged = judge(&problem, &more, &solution, options)?;
     }
+    let unsettled = if met { None } else { robust::left(&problem, &judged.solution, options) };
     found.outcome = judged.outcome;
     Ok(Part { unsettled, ..finish(&problem, judged.solution, judged.uncertainty, judged.intervals, found)? })
 }
@@ -276,7 +271,7 @@ fn descend_shapes(
     steps: u64,
     digits: Digits,
 ) -> Result<(Solution, solver::Outcome), FitError> {
-    let streamed = Streamed::from(problem, start.clone());
+    let streamed = Streamed::new(problem).starting_at(start);
     let options = match digits {
         Digits::Cost(ftol) => SolverOptions { ftol, polish: 0, ..SolverOptions::default() },
         Digits::Rough | Digits::All => SolverOptions::default(),

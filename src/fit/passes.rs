@@ -1,5 +1,13 @@
 //! Passes over the samples: each returns a few dozen sums, however many samples there are. Sums run in blocks of fixed size,
 //! in a fixed order, so they do not depend on the number of threads.
+//!
+//! Sums come in two kinds, each in two ways:
+//! - *Transforms* ([`transform`]), of a linear loss's weights and weighted data, from which every cost follows without another pass: sorted
+//!   into bins of the coordinate ([`Bins`]); or, where the samples are listed in one block and so few that adding them up takes no longer than
+//!   the bins would, kept one by one. A MERL table whose one or three channels share a mask has its bins filled from folded lines as its
+//!   samples are gathered.
+//! - *True residuals* ([`sums`]), at given shapes and weights, for last digits, other losses and robust ones: block by block; or, for a
+//!   linear loss on a MERL table that is not listed, line by line, folded about φd = 90°.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,6 +15,7 @@ use super::bins::Bins;
 use super::folded::{OnLines, Products, Residuals};
 use super::loss::{Loss, RobustKind};
 use super::merl_lines::{Line, MerlLines};
+use super::residuals::{Bend, Data, Evaluate, Linear, Out};
 use super::samples::{Block, Samples, Transforms};
 use super::tally::Tallied;
 use super::transform::Transform;
@@ -243,7 +252,8 @@ fn line_sums(
     zero: &Sums,
 ) -> Option<Vec<Vec<Sums>>> {
     let columns = zero.gradient.len();
-    let start = || (Residuals::default(), vec![(OnLines::default(), Tallied::new(columns)); weights.len()]);
+    let tallied = || if zero.normal.is_empty() { Tallied::gradient(columns) } else { Tallied::new(columns) };
+    let start = || (Residuals::default(), vec![(OnLines::default(), tallied()); weights.len()]);
     let on_lines = |(residuals, sums): &mut (Residuals, Vec<_>), lines: &MerlLines, block: &[Line]| {
         for line in block {
             residuals.set(lines, line, samples, lobes);
@@ -254,9 +264,8 @@ fn line_sums(
         }
     };
     let total = |(found, tallied): &(OnLines, Tallied)| {
-        let mut sums = Sums { cost: found.cost(), normal: DMatrix::zeros(columns, columns), ..zero.clone() };
+        let mut sums = Sums { cost: found.cost(), ..zero.clone() };
         tallied.add_to(&mut sums.gradient, &mut sums.normal);
-        sums.normal.resize_mut(zero.normal.nrows(), zero.normal.nrows(), 0.0);
         sums
     };
     let parts = samples.map_lines(start, on_lines)?;
@@ -320,209 +329,6 @@ pub(super) fn sums(
     }
     total.iter_mut().for_each(|s| s.normal.fill_upper_triangle_with_lower_triangle());
     total
-}
-
-/// A linear loss: r = g (f − y) and w g r; returns Σ w r².
-struct Linear<'a> {
-    f: &'a [f64],
-    y: &'a [f64],
-    w: &'a [f64],
-    gain: &'a [f64],
-    r: &'a mut [f64],
-    pull: &'a mut [f64],
-}
-
-impl Kernel for Linear<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _simd: S) -> f64 {
-        let n = self.r.len();
-        let (f, y, w, gain) = (&self.f[..n], &self.y[..n], &self.w[..n], &self.gain[..n]);
-        let (r, pull) = (&mut self.r[..n], &mut self.pull[..n]);
-        for i in 0..n {
-            r[i] = gain[i] * (f[i] - y[i]);
-            pull[i] = w[i] * r[i];
-        }
-        let cost = dot(r, pull);
-        for i in 0..n {
-            pull[i] *= gain[i];
-        }
-        cost
-    }
-}
-
-/// What the residuals of a block are made of.
-struct Data<'a> {
-    f: &'a [f64],
-    cos_i: &'a [f64],
-    y: &'a [f64],
-    w: &'a [f64],
-}
-
-/// Filled; `slope` holds the ∂r/∂f of a linear loss before.
-struct Out<'a> {
-    r: &'a mut [f64],
-    slope: &'a mut [f64],
-    trust: &'a mut [f64],
-    pull: &'a mut [f64],
-}
-
-struct Evaluate<'a> {
-    loss: Loss,
-    saturation: Saturation,
-    data: Data<'a>,
-    out: Out<'a>,
-}
-
-/// r and ∂r/∂f from f, cosθi, the gain of a linear loss and y. A trait, so that each loss has loops of its own, inlined into the kernel.
-trait Residual {
-    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64);
-}
-
-/// s²ρ and ρ′ of a residual.
-trait Trust: Copy {
-    fn at(self, r: f64) -> (f64, f64);
-}
-
-struct Plain;
-struct Log;
-struct CubeRoot;
-
-impl Residual for Plain {
-    #[inline(always)]
-    fn at(f: f64, _cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
-        (gain * (f - y), gain)
-    }
-}
-
-impl Residual for Log {
-    #[inline(always)]
-    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
-        Loss::Log.evaluate(f, cos_i, gain, y)
-    }
-}
-
-impl Residual for CubeRoot {
-    #[inline(always)]
-    fn at(f: f64, cos_i: f64, gain: f64, y: f64) -> (f64, f64) {
-        Loss::CubeRoot.evaluate(f, cos_i, gain, y)
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Full;
-
-/// Huber's or Cauchy's loss with s² and 1/s².
-#[derive(Clone, Copy)]
-struct Huber(f64, f64);
-#[derive(Clone, Copy)]
-struct Cauchy(f64, f64);
-
-impl Trust for Full {
-    #[inline(always)]
-    fn at(self, r: f64) -> (f64, f64) {
-        (r * r, 1.0)
-    }
-}
-
-impl Trust for Huber {
-    #[inline(always)]
-    fn at(self, r: f64) -> (f64, f64) {
-        let (rho, weight, _) = RobustKind::Huber.rho(r * r * self.1);
-        (self.0 * rho, weight)
-    }
-}
-
-impl Trust for Cauchy {
-    #[inline(always)]
-    fn at(self, r: f64) -> (f64, f64) {
-        let (rho, weight, _) = RobustKind::Cauchy.rho(r * r * self.1);
-        (self.0 * rho, weight)
-    }
-}
-
-impl Kernel for Evaluate<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _simd: S) -> f64 {
-        match self.loss {
-            Loss::Log => self.of_loss::<Log>(),
-            Loss::CubeRoot => self.of_loss::<CubeRoot>(),
-            Loss::L2 | Loss::CosineL2 | Loss::Relative => self.of_loss::<Plain>(),
-        }
-    }
-}
-
-impl Evaluate<'_> {
-    #[inline(always)]
-    fn of_loss<R: Residual>(self) -> f64 {
-        match self.saturation {
-            None => self.each::<R, Full>(Full),
-            Some((RobustKind::Huber, s)) => self.each::<R, Huber>(Huber(s * s, 1.0 / (s * s))),
-            Some((RobustKind::Cauchy, s)) => self.each::<R, Cauchy>(Cauchy(s * s, 1.0 / (s * s))),
-        }
-    }
-
-    #[inline(always)]
-    fn each<R: Residual, T: Trust>(self, rho: T) -> f64 {
-        let n = self.data.f.len();
-        let Data { f, cos_i, y, w } = self.data;
-        let (f, cos_i, y, w) = (&f[..n], &cos_i[..n], &y[..n], &w[..n]);
-        let (r, slope, trust, pull) =
-            (&mut self.out.r[..n], &mut self.out.slope[..n], &mut self.out.trust[..n], &mut self.out.pull[..n]);
-        for i in 0..n {
-            (r[i], slope[i]) = R::at(f[i], cos_i[i], slope[i], y[i]);
-        }
-        for i in 0..n {
-            // The cost waits where the pull will stand.
-            (pull[i], trust[i]) = rho.at(r[i]);
-        }
-        let cost = dot(w, pull);
-        for i in 0..n {
-            pull[i] = w[i] * trust[i] * slope[i] * r[i];
-        }
-        cost
-    }
-}
-
-/// w (ρ′ + 2uρ″) (∂r/∂f)² + w ρ′ r ∂²r/∂f².
-struct Bend<'a> {
-    loss: Loss,
-    saturation: Saturation,
-    w: &'a [f64],
-    cos_i: &'a [f64],
-    r: &'a [f64],
-    slope: &'a [f64],
-    trust: &'a [f64],
-    to: &'a mut [f64],
-}
-
-impl Kernel for Bend<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _simd: S) {
-        match self.saturation {
-            None => self.each(|_| 1.0),
-            Some((RobustKind::Huber, s)) => self.each(|r| RobustKind::Huber.rho(r * r / (s * s)).2),
-            Some((RobustKind::Cauchy, s)) => self.each(|r| RobustKind::Cauchy.rho(r * r / (s * s)).2),
-        }
-    }
-}
-
-impl Bend<'_> {
-    #[inline(always)]
-    fn each(self, growth: impl Fn(f64) -> f64) {
-        let n = self.to.len();
-        let (w, cos_i, r) = (&self.w[..n], &self.cos_i[..n], &self.r[..n]);
-        let (slope, trust, to) = (&self.slope[..n], &self.trust[..n], &mut self.to[..n]);
-        for i in 0..n {
-            let second = trust[i] * r[i] * self.loss.second_slope(slope[i], cos_i[i]);
-            to[i] = w[i] * slope[i].mul_add(slope[i] * growth(r[i]), second);
-        }
-    }
 }
 
 /// Σ list·col of every column.

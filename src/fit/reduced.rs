@@ -2,22 +2,19 @@
 //! their ranges.
 //!
 //! Three ways to evaluate it, one problem: [`Search`] from the transforms, in microseconds; [`polish`] on true residuals, which
-//! wins back the digits that sums of products lose; [`Streamed`] by passes over the samples, for losses that are not linear in
+//! wins back the digits that sums of products lose; [`Streamed`](super::streamed::Streamed) by passes over the samples, for losses that are not linear in
 //! the weights.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
-use argmin::core::Error;
 use nalgebra::{DMatrix, DVector};
 
 use super::limits::Ranges;
 use super::options::FitError;
 use super::passes::{self, Moments, Saturation, ShapedLobe, Sums, Want};
+use super::powers::PowerColumns;
 use super::quadratic::{Feasible, Quadratic, Row};
 use super::samples::Samples;
-use super::solver::{Linearization, Linearize};
 use super::transform::Transform;
+use super::walk::Walk;
 use crate::brdf::{LobeKind, MAX_LOBES, ModelSpec, Parameter};
 
 /// A model on samples. Weights and values are in the samples' scale.
@@ -140,7 +137,7 @@ impl<'a> Problem<'a> {
 
     /// Half the gradient by t and the Gauss–Newton matrix of the reduced cost (Kaufman 1975): the slope columns' Gram matrix, less
     /// what the free weights can follow. `normal` is by [weights, bare slopes] of each channel, `pull` Σ w r slope of a channel.
-    fn reduce<'m>(
+    pub fn reduce<'m>(
         &self,
         weights: &[DVector<f64>],
         normal: impl Fn(usize) -> &'m DMatrix<f64>,
@@ -210,7 +207,7 @@ impl<'a> Search<'a> {
 
     /// As the solver takes it.
     pub fn walk(&self) -> Walk<'_> {
-        Walk { search: self, last: RefCell::new(None) }
+        Walk::new(self)
     }
 
     /// Gram matrices and data vectors at `lobes`, with the slopes by t on request.
@@ -279,225 +276,6 @@ impl<'a> Search<'a> {
 /// Weights in a row.
 fn row(x: &DVector<f64>) -> Row {
     std::array::from_fn(|l| x.get(l).copied().unwrap_or(0.0))
-}
-
-/// A way through the search's points. An accepted trial is linearised where its cost was taken, so the last point is kept.
-#[derive(Debug)]
-pub(super) struct Walk<'a> {
-    search: &'a Search<'a>,
-    last: RefCell<Option<Rc<Visited>>>,
-}
-
-#[derive(Debug)]
-struct Visited {
-    t: DVector<f64>,
-    moments: Moments,
-    weights: Vec<DVector<f64>>,
-    cost: f64,
-}
-
-impl Walk<'_> {
-    fn visit(&self, t: &DVector<f64>) -> Rc<Visited> {
-        if let Some(last) = self.last.borrow().as_ref().filter(|last| last.t == *t) {
-            return Rc::clone(last);
-        }
-        let moments = self.search.moments(&self.search.problem.shaped(t.as_slice()), true);
-        let weights = self.search.weights(&moments);
-        let cost = self.search.cost_of(&moments, &weights).max(0.0);
-        let here = Rc::new(Visited { t: t.clone(), moments, weights, cost });
-        *self.last.borrow_mut() = Some(Rc::clone(&here));
-        here
-    }
-}
-
-impl Linearize for Walk<'_> {
-    fn cost(&self, t: &DVector<f64>) -> Result<f64, Error> {
-        Ok(self.visit(t).cost)
-    }
-
-    fn linearize(&self, t: &DVector<f64>) -> Result<Linearization, Error> {
-        let k = self.search.problem.kinds.len();
-        let here = self.visit(t);
-        let (moments, weights) = (&here.moments, &here.weights);
-        let pull = |c: usize, i: usize| {
-            let products = weights[c].iter().enumerate().map(|(l, x)| moments.gram(c)[(k + i, l)] * x);
-            products.sum::<f64>() - moments.data[c][k + i]
-        };
-        let (normal, gradient) = self.search.problem.reduce(weights, |c| moments.gram(c), pull);
-        Ok(Linearization::from_normal(here.cost, normal, &gradient))
-    }
-}
-
-/// A lobe constant·e^{nx}; without an exponent, a constant on all samples.
-struct PowerLobe {
-    exponent: Option<f64>,
-}
-
-/// A column (constant + linear·x)·e^{nx}: a lobe or its slope by t.
-struct PowerColumn {
-    lobe: usize,
-    constant: f64,
-    linear: f64,
-}
-
-struct PowerColumns {
-    lobes: Vec<PowerLobe>,
-    list: Vec<PowerColumn>,
-}
-
-impl PowerColumns {
-    fn new(lobes: &[ShapedLobe], slopes: bool) -> Self {
-        let (mut powers, mut values, mut derivatives) = (Vec::new(), Vec::new(), Vec::new());
-        for (lobe, shaped) in lobes.iter().enumerate() {
-            let exponent = shaped.shape.first().copied();
-            let norm = exponent.and_then(|n| shaped.kind.lobe().power(n));
-            let constant = norm.map_or_else(|| shaped.kind.lobe().value(&[], 0.0, &mut []), |(c, _)| c);
-            values.push(PowerColumn { lobe, constant, linear: 0.0 });
-            if let (true, Some(n), Some((norm, slope))) = (slopes, exponent, norm) {
-                derivatives.push(PowerColumn { lobe, constant: n * slope, linear: n * norm });
-            }
-            powers.push(PowerLobe { exponent });
-        }
-        Self { lobes: powers, list: values.into_iter().chain(derivatives).collect() }
-    }
-
-    /// Writes the sums of products of the columns of lobes `a` and `b` from the transform's jet at the sum of their exponents.
-    fn products(&self, a: usize, b: usize, jet: &[f64; 3], gram: &mut DMatrix<f64>) {
-        for (i, first) in self.list.iter().enumerate().filter(|(_, column)| column.lobe == a) {
-            for (j, second) in self.list.iter().enumerate().filter(|(_, column)| column.lobe == b) {
-                let cross = first.constant * second.linear + first.linear * second.constant;
-                let sum =
-                    first.constant * second.constant * jet[0] + cross * jet[1] + first.linear * second.linear * jet[2];
-                gram[(i, j)] = sum;
-                gram[(j, i)] = sum;
-            }
-        }
-    }
-}
-
-/// The problem evaluated by passes over the samples; the weights come from an inner Newton iteration on the loss's own curvature, damped
-/// where it overshoots (a linear loss needs one step).
-#[derive(Debug)]
-pub(super) struct Streamed<'a> {
-    problem: &'a Problem<'a>,
-    /// The last point solved: where the next one's weights start.
-    last: RefCell<Option<Solution>>,
-    /// Predicted share of the cost at which the inner iteration ends.
-    tolerance: f64,
-}
-
-/// Steps of the inner iteration at most, and the predicted share of the cost at which it ends.
-const INNER_STEPS: usize = 60;
-const INNER_TOLERANCE: f64 = 1e-15;
-const ROUGH_TOLERANCE: f64 = 1e-7;
-
-impl<'a> Streamed<'a> {
-    pub fn new(problem: &'a Problem<'a>) -> Self {
-        Self { problem, last: RefCell::new(None), tolerance: INNER_TOLERANCE }
-    }
-
-    /// Good enough to tell valleys apart.
-    pub fn rough(problem: &'a Problem<'a>) -> Self {
-        Self { tolerance: ROUGH_TOLERANCE, ..Self::new(problem) }
-    }
-
-    /// Starting at weights known from elsewhere.
-    pub fn from(problem: &'a Problem<'a>, start: Solution) -> Self {
-        Self { last: RefCell::new(Some(Solution { t: Vec::new(), ..start })), ..Self::new(problem) }
-    }
-
-    /// The weights that minimise the cost at `t`.
-    pub fn solve(&self, t: &[f64]) -> Solution {
-        let last = self.last.borrow().clone();
-        if let Some(known) = last.as_ref().filter(|s| s.t == t) {
-            return known.clone();
-        }
-        let lobes = self.problem.shaped(t);
-        let start = last.map_or_else(|| self.first_weights(&lobes), |s| s.weights);
-        let solution = self.descend(t, lobes, start);
-        *self.last.borrow_mut() = Some(solution.clone());
-        solution
-    }
-
-    /// Weights to begin with: those of the plain linear problem; at least a trace of each, for slopes at 0 may be infinite.
-    fn first_weights(&self, lobes: &[ShapedLobe]) -> Vec<DVector<f64>> {
-        let guess = DVector::from_element(lobes.len(), 0.1);
-        (0..self.problem.samples.channels.len())
-            .map(|c| {
-                let range = |i: usize| self.problem.ranges[c][i];
-                let cap = self.problem.cap.unwrap_or(f64::INFINITY);
-                let clamp = |i: usize, v: f64| v.min(cap / lobes.len() as f64).clamp(range(i).0, range(i).1);
-                DVector::from_fn(lobes.len(), |i, _| clamp(i, guess[i]))
-            })
-            .collect()
-    }
-
-    fn descend(&self, t: &[f64], lobes: Vec<ShapedLobe>, start: Vec<DVector<f64>>) -> Solution {
-        let problem = self.problem;
-        let evaluate = |x: &[DVector<f64>]| passes::sums(problem.samples, &lobes, x, problem.saturation, Want::Weights);
-        let mut x = start;
-        let mut at = evaluate(&x);
-        let mut damping = vec![0.0f64; x.len()];
-        for _ in 0..INNER_STEPS {
-            let total: f64 = at.iter().map(|s| s.cost).sum();
-            let trial: Vec<(DVector<f64>, f64)> =
-                (0..x.len()).map(|c| self.inner_step(c, &x[c], &at[c], damping[c])).collect();
-            if trial.iter().map(|(_, gain)| gain).sum::<f64>() <= self.tolerance * total || total == 0.0 {
-                break;
-            }
-            let next: Vec<DVector<f64>> = trial.iter().map(|(x, _)| x.clone()).collect();
-            let found = evaluate(&next);
-            let mut moved = false;
-            for c in 0..x.len() {
-                if found[c].cost <= at[c].cost {
-                    damping[c] = if damping[c] > 1e-6 { damping[c] / 16.0 } else { 0.0 };
-                    moved |= found[c].cost < at[c].cost;
-                    x[c].clone_from(&next[c]);
-                    at[c] = found[c].clone();
-                } else {
-                    damping[c] = (8.0 * damping[c]).max(0.03);
-                }
-            }
-            let hopeless = damping.iter().all(|d| *d == 0.0 || *d > 1e12);
-            if !moved && hopeless {
-                break;
-            }
-        }
-        let cost = at.iter().map(|s| s.cost).sum();
-        Solution { t: t.to_vec(), lobes, weights: x, cost }
-    }
-
-    /// The minimum of one channel's quadratic model, with damping as a share of its diagonal, and how much it promises.
-    fn inner_step(&self, channel: usize, x: &DVector<f64>, at: &Sums, damping: f64) -> (DVector<f64>, f64) {
-        let k = x.len();
-        let mut gram = at.normal.view((0, 0), (k, k)).into_owned();
-        for i in 0..k {
-            gram[(i, i)] *= 1.0 + damping;
-        }
-        let gradient = at.gradient.rows(0, k);
-        let b = &gram * x - gradient;
-        let quadratic = Quadratic::new(k, |i, j| gram[(i, j)], |i| b[i]);
-        let next = DVector::from_column_slice(&quadratic.minimise(&self.problem.feasible(channel))[..k]);
-        let step = &next - x;
-        let gain = -(2.0 * step.dot(&gradient) + step.dot(&(&gram * &step)));
-        (next, gain.max(0.0))
-    }
-}
-
-impl Linearize for Streamed<'_> {
-    fn cost(&self, t: &DVector<f64>) -> Result<f64, Error> {
-        Ok(self.solve(t.as_slice()).cost)
-    }
-
-    fn linearize(&self, t: &DVector<f64>) -> Result<Linearization, Error> {
-        let k = self.problem.kinds.len();
-        let solution = self.solve(t.as_slice());
-        let problem = self.problem;
-        let all = passes::sums(problem.samples, &solution.lobes, &solution.weights, problem.saturation, Want::All);
-        let pull = |c: usize, i: usize| all[c].gradient[k + i];
-        let (normal, gradient) = problem.reduce(&solution.weights, |c| &all[c].normal, pull);
-        Ok(Linearization::from_normal(solution.cost, normal, &gradient))
-    }
 }
 
 /// A lobe whose share of a channel's root-sum-square is below this is rounding: 16 units in the last place.

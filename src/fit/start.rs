@@ -5,10 +5,11 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::options::FitError;
-use super::passes::ShapedLobe;
+use super::passes::{self, ShapedLobe};
 use super::quadratic::{Feasible, Quadratic};
-use super::reduced::{Problem, Search, Streamed};
+use super::reduced::{Problem, Search};
 use super::solver::{self, LevenbergMarquardt, Linearize, Outcome, SolverOptions};
+use super::streamed::Streamed;
 use crate::brdf::MAX_LOBES;
 use crate::numeric::random::{Purpose, RngExt, stream};
 
@@ -197,6 +198,19 @@ pub(super) fn search_streamed(few: &Problem<'_>, more: &Problem<'_>, steps: u64)
     best_of(outcomes, lattice)
 }
 
+/// The lowest minimum without a robust loss: from the transforms where they know all sums, else on parts of the samples, few and more.
+pub(super) fn search_plain(
+    problem: &Problem<'_>,
+    (few, more): (&Problem<'_>, &Problem<'_>),
+    steps: u64,
+) -> Result<Found, FitError> {
+    if !problem.is_transformable() {
+        return search_streamed(few, more, steps);
+    }
+    let (transform, energy) = passes::transform(problem.samples);
+    search(&Search::new(problem, &transform, &energy), steps)
+}
+
 fn polish_start(at: impl Linearize, problem: &Problem<'_>, start: Vec<f64>, steps: u64) -> Result<Outcome, FitError> {
     // The last digits are for the best alone.
     let options = SolverOptions { ftol: 1e-13, polish: 0, ..SolverOptions::default() };
@@ -205,7 +219,7 @@ fn polish_start(at: impl Linearize, problem: &Problem<'_>, start: Vec<f64>, step
 }
 
 /// A smaller model's optimum with one lobe more, where that helps most among the last shape's nodes.
-fn extended(problem: &Problem<'_>, smaller: &[f64], cost: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
+pub(super) fn extended(problem: &Problem<'_>, smaller: &[f64], cost: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
     let nodes = Nodes::new(problem);
     let last = nodes.of.last().map_or(&[][..], Vec::as_slice);
     let tried = last.par_iter().map(|&k| {

@@ -18,7 +18,7 @@ impl Scratch {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tallied {
     pub gradient: Vec<Eight>,
-    /// The lower triangle, row by row.
+    /// The lower triangle, row by row; empty where only the gradient is wanted.
     products: Vec<Eight>,
 }
 
@@ -28,8 +28,17 @@ impl Tallied {
         Self { gradient: vec![zero; columns], products: vec![zero; columns * (columns + 1) / 2] }
     }
 
+    /// Of the gradient alone.
+    pub fn gradient(columns: usize) -> Self {
+        Self { products: Vec::new(), ..Self::new(columns) }
+    }
+
     /// Adds the columns that it has room for.
     pub fn add(&mut self, scratch: &Scratch) {
+        if self.products.is_empty() {
+            let columns = &scratch.columns[..self.gradient.len()];
+            return vectorised(Pulls { columns, pull: &scratch.pull, into: &mut self.gradient });
+        }
         let (list, pull, weight) = (&scratch.columns[..self.gradient.len()], &scratch.pull[..], &scratch.weight[..]);
         match list.len() {
             1 => vectorised(Tally::<1> { columns: list, pull, weight, into: self }),
@@ -113,6 +122,22 @@ impl<S: Simd, const K: usize> RunningSums<S, K> {
                 }
             }
         }
+    }
+}
+
+/// Σ pull·col alone.
+struct Pulls<'a> {
+    columns: &'a [Vec<f64>],
+    pull: &'a [f64],
+    into: &'a mut [Eight],
+}
+
+impl Kernel for Pulls<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _simd: S) {
+        self.into.iter_mut().zip(self.columns).for_each(|(to, column)| to[0] += dot(self.pull, column));
     }
 }
 

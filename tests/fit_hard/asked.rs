@@ -443,6 +443,24 @@ fn a_time_budget_ends_early_and_says_how_far_it_got() {
     assert_eq!((parameters(&exact), &record(&exact).subset), (parameters(&all), &None));
 }
 
+/// The fit of a whole table takes a hundredth of what the comparison of models does, which eats up the budget before.
+#[test]
+fn comparing_models_counts_against_a_time_budget() {
+    let mut noisy = Noisy::new(&Scan::Merl);
+    let m = noisy.trial(0);
+    let auto = |time_budget| {
+        let o = FitOptions { time_budget, ..options("lambert") };
+        fit_best_model(m, &o).unwrap_or_else(|e| panic!("{e}")).material
+    };
+    let took = record(&auto(None)).seconds;
+    let alone = record(&fitted(m, &options("lambert+phong")).material).seconds;
+    println!("{took:.3} s with the comparison, {alone:.3} s without");
+    let short = auto(Some(Duration::from_secs_f64(took / 4.0)));
+    assert_eq!((record(&short).status.as_str(), record(&short).subset.is_some()), ("budget", true));
+    let long = auto(Some(Duration::from_hours(1)));
+    assert_eq!((record(&long).status.as_str(), &record(&long).subset), ("converged", &None));
+}
+
 fn flat(list: &[LobeRecord<Option<f64>>]) -> Vec<f64> {
     let all = list.iter().flat_map(|l| l.weight.iter().copied().chain(l.shape.iter().filter_map(|(_, v)| v.get(0))));
     all.map(|e| e.expect("determined")).collect()

@@ -140,6 +140,11 @@ fn the_interval_of_what_one_sample_decides_is_by_the_others_noise() {
         let noise = 0.01 * std::f64::consts::TAU / 100_002.0;
         assert!(high - low < 6.0 * noise, "seed {seed}: {low} to {high}");
         held += u64::from((low..=high).contains(&0.2));
+        assert!(
+            record(&got).warnings.iter().any(|w| w.contains("decide phong.weight[")),
+            "{:?}",
+            record(&got).warnings
+        );
     }
     // 95 % of 100, four standard deviations below.
     assert!(held >= 86, "{held} of {seeds}");
@@ -155,4 +160,6 @@ fn a_huber_fit_pulled_to_one_side_says_how_far() {
     };
     let held: Vec<[bool; 3]> = (0..40).map(|seed| cell.held([0.3, 0.2, 40.0], seed)).collect();
     assert!((0..3).all(|p| held.iter().filter(|h| h[p]).count() >= 35), "{held:?}");
+    let got = solved(&cell.measure([0.3, 0.2, 40.0], 0), &cell.options());
+    assert!(record(&got).warnings.iter().any(|w| w.contains("lean to one side")), "{:?}", record(&got).warnings);
 }

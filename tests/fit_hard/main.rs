@@ -15,5 +15,6 @@ mod profile;
 mod properties;
 mod recovery;
 mod reference;
+mod robust;
 mod said;
 mod support;

@@ -4,7 +4,6 @@ use goniofit::brdf::Material;
 use goniofit::fit::{FitOptions, Limit, Loss, Robust, RobustKind};
 use goniofit::gonio::Instrument;
 use goniofit::measurement::Measurement;
-use goniofit::numeric::stats::student_quantile;
 
 use crate::reference::{Reference, at};
 use crate::support::*;
@@ -59,11 +58,9 @@ fn cost_at(m: &Measurement, o: &FitOptions, got: &Material, name: &str, value: f
 }
 
 /// The rise of the cost that an interval's end stands for: (t σ)²/(A⁻¹)ⱼⱼ.
-fn wanted_rise(reference: &Reference, p: &[f64], got: &Material, robust: Option<(RobustKind, f64)>, j: usize) -> f64 {
-    let error = errors(got)[j].expect("determined") / if j == p.len() - 1 { p[j] } else { 1.0 };
-    let t = student_quantile(0.975, (reference.values.len() - p.len()) as f64);
+fn wanted_rise(reference: &Reference, p: &[f64], robust: Option<(RobustKind, f64)>, j: usize) -> f64 {
     let inverse = reference.normal(p, robust).try_inverse().expect("determined");
-    (t * error).powi(2) / inverse[(j, j)]
+    reference.half_widths(p, robust)[j].powi(2) / inverse[(j, j)]
 }
 
 /// Few noisy samples: the exponent's interval is lopsided in ln n, and at both its ends the cost has risen as wanted.
@@ -76,7 +73,7 @@ fn a_poorly_determined_exponent_has_a_lopsided_interval_where_the_cost_has_risen
         let robust = settled(&o, &got);
         let (low, high) = intervals(&got)[2].expect("determined");
         let lopsided = (high / p[2]).ln() / (p[2] / low).ln();
-        let wanted = wanted_rise(&reference, &p, &got, robust, 2);
+        let wanted = wanted_rise(&reference, &p, robust, 2);
         let rises = [low, high].map(|n| (cost_at(&m, &o, &got, NAMES[2], n) - record(&got).cost) / wanted);
         println!("{}: {low:.3} {:.3} {high:.3}, above over below {lopsided:.3}, rises {rises:?}", named(&o), p[2]);
         assert!((lopsided - 1.0).abs() > 0.01, "{}: {lopsided}", named(&o));
@@ -101,7 +98,7 @@ fn a_weight_near_zero_has_an_interval_that_begins_there() {
                 assert!(high > 1e-6, "{} seed {seed}: {high:e}", named(&o));
                 continue;
             }
-            let wanted = wanted_rise(&reference, &p, &got, settled(&o, &got), 0);
+            let wanted = wanted_rise(&reference, &p, settled(&o, &got), 0);
             let rise = (cost_at(&m, &o, &got, NAMES[0], high) - record(&got).cost) / wanted;
             println!("{} seed {seed}: {low:e} {:e} {high:e}, rise {rise}", named(&o), p[0]);
             assert!((rise - 1.0).abs() < 1e-3, "{} seed {seed}: {rise}", named(&o));

@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use goniofit::brdf::Material;
 use goniofit::fit::{FitOptions, Loss, Robust, RobustKind, WeightMode};
 use goniofit::measurement::Measurement;
+use goniofit::numeric::stats::student_quantile;
 use nalgebra::{DMatrix, DVector};
 
 use crate::support::{cos_alpha, parameters};
@@ -182,6 +183,44 @@ impl Reference {
         let covariance = &inverse * b * &inverse;
         let weights = self.channels * (1 + self.glossy);
         (0..k).map(|i| covariance[(i, i)].sqrt() * if i < weights { 1.0 } else { p[i] }).collect()
+    }
+
+    /// t σ of an interval of one channel without a stated σ, without gross outliers, exponents by ln n: A⁻¹ B A⁻¹ with v = (r² + 0.01 q)/(1.01 − h),
+    /// q = Σ pull²/Σ m (1 − h) the noise of the channel, and as many degrees of freedom as the samples that decide a parameter have.
+    pub fn half_widths(&self, p: &[f64], robust: Option<(RobustKind, f64)>) -> Vec<f64> {
+        let inverse = self.normal(p, robust).try_inverse().expect("determined");
+        let rows: Vec<(f64, DVector<f64>, f64, f64)> =
+            self.values.iter().map(|v| self.leverage(p, v, robust, &inverse)).collect();
+        let (squares, expected) =
+            rows.iter().fold((0.0, 0.0), |sum, (pull, _, m, rest)| (sum.0 + pull * pull, sum.1 + m * rest));
+        let q = squares / expected;
+        let half_width = |j: usize| {
+            let (mut variance, mut mean, mut scatter) = (0.0, 0.0, 0.0);
+            for (pull, moved, m, rest) in &rows {
+                let far = moved[j] * moved[j];
+                variance += far * (pull * pull + 0.01 * q * m) / (rest + 0.01);
+                mean += far * q * m;
+                scatter += (far * q * m * rest / (rest + 0.01)).powi(2);
+            }
+            let freedom = (mean * mean / scatter).min((self.values.len() - p.len()) as f64);
+            student_quantile(0.975, freedom) * variance.sqrt()
+        };
+        (0..p.len()).map(half_width).collect()
+    }
+
+    /// Of a value: w ρ′ r ∂r/∂f, A⁻¹ ∂f, (w ρ′ ∂r/∂f)², 1 − h.
+    fn leverage(
+        &self,
+        p: &[f64],
+        v: &Value,
+        robust: Option<(RobustKind, f64)>,
+        inverse: &DMatrix<f64>,
+    ) -> (f64, DVector<f64>, f64, f64) {
+        let (r, slope, column) = (self.residual(p, v), self.slope(p, v), self.columns(p, v));
+        let w = v.w * robust.map_or(1.0, |(kind, s)| rho(kind, (r / s).powi(2)).1);
+        let moved = inverse * &column;
+        let rest = (1.0 - w * slope * slope * column.dot(&moved)).max(0.0);
+        (w * r * slope, moved, (w * slope).powi(2), rest)
     }
 
     /// SCALE × 1.4826 × the median absolute deviation of the residuals from their median.

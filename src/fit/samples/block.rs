@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::measurement::MerlGrid;
 use crate::numeric::simd::{Kernel, Simd};
 
 /// Samples in a row, structure of arrays. Lists by channel hold the channels of the fit, in its order.
@@ -95,6 +96,11 @@ pub(super) fn neighbours(index: &[u32], near: impl Fn(usize, usize) -> bool) -> 
     std::iter::once(0.0).take(index.len()).chain(index.windows(2).map(pair)).collect()
 }
 
+/// Whether entry `b` of a MERL table is the next after `a` on the same line of φd.
+pub(super) fn next_on_line(a: usize, b: usize) -> bool {
+    b == a + 1 && !b.is_multiple_of(MerlGrid::PHI_D)
+}
+
 /// A direction's polar ring and its place on it, coarse enough to overlook rounding.
 fn place(w: DVec3) -> [i32; 2] {
     const STEPS: f64 = 1e5;
@@ -123,5 +129,20 @@ impl Kernel for Values<'_> {
         for y in self.y {
             *y = if y.is_nan() { 0.0 } else { *y * self.unit };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_of_a_line_is_no_neighbour_of_the_last_of_the_one_before() {
+        let last = MerlGrid::PHI_D as u32 - 1;
+        assert_eq!(
+            neighbours(&[0, 1, 3, last - 1, last, last + 1, last + 2], next_on_line),
+            [0., 1., 0., 0., 1., 0., 1.]
+        );
+        assert!(neighbours(&[], next_on_line).is_empty());
     }
 }

@@ -1,9 +1,11 @@
 //! From the fit's numbers to the material and its record.
 
+mod names;
+mod warnings;
+
 use super::energy;
 use super::limits::{Ranges, TINY_SHAPE};
-use super::missing;
-use super::options::{FitOptions, WeightMode};
+use super::options::FitOptions;
 use super::part::Part;
 use super::solver::Stop;
 use crate::brdf::{
@@ -11,6 +13,8 @@ use crate::brdf::{
     ResidualRecord, SearchRecord, SubsetRecord,
 };
 use crate::measurement::Measurement;
+use names::{ended, lobe_name, without_error};
+use warnings::{End, Ended, STRUCTURED};
 
 /// All that a record is made of: one part for all channels, or one a channel.
 pub(super) struct Facts<'a> {
@@ -34,58 +38,11 @@ struct Row {
     at_end: Shapes<Option<Ended>>,
 }
 
-/// An end of a range.
-#[derive(Debug, Clone, Copy)]
-enum End {
-    Low,
-    High,
-}
-
-/// A shape that ended at an end of its range.
-#[derive(Debug, Clone, Copy)]
-struct Ended {
-    value: f64,
-    end: End,
-    /// Whether that end was asked for, else it is the end of what is searched.
-    asked: bool,
-    /// Whether the data determine it all the same.
-    determined: bool,
-    /// Whether it has an interval to one side.
-    interval: bool,
-}
-
-impl Ended {
-    /// What is told of the parameter called `name`.
-    fn warning(self, name: &str) -> String {
-        let (end, more) = match self.end {
-            End::High => ("high", "a larger one"),
-            End::Low => ("low", "a smaller one"),
-        };
-        let range = if self.asked { "was asked for" } else { "is searched" };
-        let place = format!("{name} ended at {}, the {end} end of the range that {range}", brief(self.value));
-        let wish = format!("{place}: the data ask for {more}, so there is no standard error");
-        match (self.determined, self.interval) {
-            (true, true) => format!("{wish}; an interval reaches from that end inwards"),
-            (true, false) => wish,
-            (false, _) => place,
-        }
-    }
-}
-
-/// Six digits at most, without zeros at the end.
-fn brief(x: f64) -> String {
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    if (1e-4..1e6).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
-}
-
 /// Shape parameters of a lobe by name.
 type Shapes<T> = Vec<(String, PerChannel<T>)>;
 
 /// Correlations of more parameters than this are left out.
 const MOST_CORRELATED: usize = 40;
-/// Share of structure in the residuals' variance from which it is warned of.
-const STRUCTURED: f64 = 0.25;
-
 /// The fitted material with its record.
 pub(super) fn material(facts: &Facts<'_>) -> Material {
     let mut rows: Vec<Row> = (0..facts.model.lobes().len()).map(|l| facts.row(l)).collect();
@@ -307,136 +264,7 @@ impl Facts<'_> {
         let matrix = index.iter().map(|i| index.iter().map(|j| entry(i, j)).collect()).collect();
         Some(Correlation { parameters, matrix })
     }
-
-    fn warnings(&self, material: &Material, record: &FitRecord, at_end: &[(String, Ended)]) -> Vec<String> {
-        let mut list = Vec::new();
-        if !record.undetermined.is_empty() {
-            list.push(format!("the data do not determine {}", record.undetermined.join(", ")));
-        }
-        list.extend(at_end.iter().map(|(name, ended)| ended.warning(name)));
-        if record.status == "max-iterations" {
-            list.push("the search used up its steps before it converged".into());
-        }
-        if self.options.weights == WeightMode::SolidAngle && self.parts[0].weighting == WeightMode::Uniform.name() {
-            list.push("the measurement has no grid, so every sample counts the same (uniform weights)".into());
-        }
-        for (c, channel) in self.measurement.channels.iter().enumerate() {
-            let (part, own) = self.of_channel(c);
-            if part.counts[own] == 0 {
-                list.push(format!("channel {channel} has no valid sample"));
-            }
-        }
-        let refused: usize = self.parts.iter().map(|p| p.refused).sum();
-        let whole = !self.options.use_sigma && self.parts.iter().all(|p| p.subset.is_none());
-        let valid = whole.then(|| self.parts.iter().flat_map(|p| &p.counts).sum::<usize>() + refused);
-        list.extend(missing::warnings(self.measurement, self.options, valid));
-        if refused > 0 {
-            list.push(format!("{refused} values are too negative for the logarithm of the loss and were left out"));
-        }
-        if let Some(subset) = record.subset.as_ref().filter(|_| record.status == "budget") {
-            list.push(format!(
-                "the time ended at {} of about {} directions: the rmse over all is expected to be {:.2} % above the best, and at most \
-                 {:.2} % with 95 % confidence",
-                subset.samples,
-                subset.of,
-                100.0 * subset.rmse_excess,
-                100.0 * subset.rmse_excess_95
-            ));
-        }
-        list.extend(self.structure_warning(record));
-        list.extend(self.noise_warnings(record));
-        let capped: Vec<&str> = self.capped().map(|c| self.measurement.channels[c].as_str()).collect();
-        if !capped.is_empty() {
-            let plural = if capped.len() > 1 { "s" } else { "" };
-            list.push(format!(
-                "the energy limit decides: the weights of channel{plural} {} add up to 1, the most they may",
-                capped.join(", ")
-            ));
-        }
-        list.extend(record.energy.as_ref().and_then(|e| energy::warning(material, e)));
-        list
-    }
-
-    /// Channels whose weights the energy limit decides.
-    fn capped(&self) -> impl Iterator<Item = usize> {
-        (0..self.measurement.channels.len()).filter(|&c| {
-            let (part, own) = self.of_channel(c);
-            part.capped[own]
-        })
-    }
-
-    /// What the noise does to the fit, or what can't be said of it.
-    fn noise_warnings(&self, record: &FitRecord) -> Vec<String> {
-        let mut list = Vec::new();
-        let structured = record.residual.as_ref().is_some_and(|r| r.structured_share > STRUCTURED);
-        // Of other losses the stated noise is a guess where it is not small beside the value.
-        let linear = matches!(self.options.loss, super::loss::Loss::L2 | super::loss::Loss::CosineL2);
-        let off = self.parts.iter().filter_map(|p| p.offset).fold(0.0, f64::max);
-        if off > 0.0 && !structured {
-            let cause = if self.parts[0].weighting == "sigma" {
-                "weights that follow the noise pull"
-            } else {
-                "this loss pulls"
-            };
-            let misfit = record.residual.as_ref().is_some_and(|r| r.model_rmse > 0.0);
-            let or = if misfit { " (or the model's own error, weighed differently, does)" } else { "" };
-            list.push(format!(
-                "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away{or}, and \
-                 neither standard errors nor intervals cover that; `--loss cosine-l2` without `--use-sigma` follows the mean"
-            ));
-        }
-        if let Some(residual) = record
-            .residual
-            .as_ref()
-            .filter(|r| linear && r.noise_from == "sigma" && record.rmse < OVERSTATED * r.noise_rmse)
-        {
-            list.push(format!(
-                "the residuals are {:.1} times smaller than the stated σ: it may be overstated, and the standard errors with it",
-                residual.noise_rmse / record.rmse
-            ));
-        }
-        if let Some(left) = self.parts.iter().filter_map(|p| p.unsettled).max_by(|a, b| a.abs().total_cmp(&b.abs())) {
-            list.push(unsettled_warning(left));
-        }
-        if self.parts.iter().any(|p| p.unjudged) {
-            list.push(
-                "whether the residuals are noise or model error can't be told: among the samples that were used too few are \
-                 neighbours, and no σ is stated for all of them"
-                    .into(),
-            );
-        }
-        list
-    }
-
-    /// Says in plain words that the model can't bend as the material does.
-    fn structure_warning(&self, record: &FitRecord) -> Option<String> {
-        let residual = record.residual.as_ref().filter(|r| r.structured_share > STRUCTURED)?;
-        let unit = match self.options.loss.unit(self.measurement.dimension) {
-            "" => String::new(),
-            unit => format!(" {unit}"),
-        };
-        Some(format!(
-            "the model does not describe these data: {:.0} % of the residuals' variance is structure, not noise (model error \
-             {:.3e}{unit}, noise {:.1e}{unit}); the standard errors are of noise alone, `model_error` says how far the model's own error \
-             moves the parameters",
-            100.0 * residual.structured_share,
-            residual.model_rmse,
-            residual.noise_rmse,
-        ))
-    }
 }
-
-/// The robust scale and the parameters have not met: ln(scale asked for / scale used) is `left`.
-fn unsettled_warning(left: f64) -> String {
-    format!(
-        "the robust scale has not settled: the residuals ask for one that differs by {:.1e} % from the one that was used, and the \
-         parameters are those of the latter",
-        100.0 * left.exp_m1().abs()
-    )
-}
-
-/// Residuals below this share of the stated σ are worth a word.
-const OVERSTATED: f64 = 0.7;
 
 /// A shape parameter of one part, in natural units.
 #[derive(Default)]
@@ -529,52 +357,4 @@ fn order_of(rows: &[Row], limited: &[LobeKind]) -> Vec<usize> {
         }
     }
     order
-}
-
-/// What lobe `l` of these kinds is called: `phong`, `phong[1]` for the second of the kind.
-fn lobe_name(kinds: &[LobeKind], l: usize) -> String {
-    match kinds[..l].iter().filter(|k| **k == kinds[l]).count() {
-        0 => kinds[l].name().into(),
-        k => format!("{}[{k}]", kinds[l].name()),
-    }
-}
-
-/// Names of the parameters without a standard error: `phong.exponent`, `lambert.weight[g]`, `phong[1].exponent`.
-fn without_error(material: &Material, errors: &[LobeRecord<Option<f64>>]) -> Vec<String> {
-    let mut names = Vec::new();
-    for (l, error) in errors.iter().enumerate() {
-        let lobe = material.lobe_name(l);
-        let open = error.weight.iter().zip(&material.channels).filter(|(e, _)| e.is_none());
-        names.extend(open.map(|(_, c)| format!("{lobe}.weight[{c}]")));
-        let open = shape_names(material, l, &error.shape, |e| e.is_none().then_some(()));
-        names.extend(open.into_iter().map(|(name, ())| name));
-    }
-    names
-}
-
-/// The shapes that ended at an end of their range, by name.
-fn ended(material: &Material, at_end: &[Shapes<Option<Ended>>]) -> Vec<(String, Ended)> {
-    let of_lobe = |(l, shapes)| shape_names(material, l, shapes, |ended: &Option<Ended>| *ended);
-    at_end.iter().enumerate().flat_map(of_lobe).collect()
-}
-
-/// What there is to tell of the shapes of lobe `l`, by name.
-fn shape_names<T, U>(
-    material: &Material,
-    l: usize,
-    shapes: &Shapes<T>,
-    tell: impl Fn(&T) -> Option<U>,
-) -> Vec<(String, U)> {
-    let lobe = material.lobe_name(l);
-    let mut told = Vec::new();
-    for (name, value) in shapes {
-        match value {
-            PerChannel::Shared(value) => told.extend(tell(value).map(|t| (format!("{lobe}.{name}"), t))),
-            PerChannel::Each(list) => {
-                let each = list.iter().zip(&material.channels);
-                told.extend(each.filter_map(|(value, c)| tell(value).map(|t| (format!("{lobe}.{name}[{c}]"), t))));
-            }
-        }
-    }
-    told
 }

@@ -1,0 +1,123 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::brdf::{ModelSpec, SpecError};
+use crate::cli::info::Reading;
+use crate::fit::{Limit, Loss, Robust, WeightMode};
+
+const MODEL: &str = "Model and loss";
+const SAMPLES: &str = "Samples and their weights";
+const EFFORT: &str = "Effort";
+const OUTPUT: &str = "Output";
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit fit gold.binary --out gold.json
+  goniofit fit *.binary --model lambert+phong --out-dir fits/
+  goniofit fit gold.binary --model auto
+  goniofit fit lab.csv --use-sigma --robust cauchy
+  goniofit fit gold.binary --fix phong.exponent=50 --bound lambert.weight=0..0.3
+  goniofit fit gold.binary --target-rmse-excess 1%")]
+#[allow(clippy::struct_excessive_bools)] // each is an option of its own
+pub(in crate::cli) struct Args {
+    /// Measurements; `-` is stdin
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Lobes joined by +, or `auto` to compare models and take the simplest good one
+    #[arg(long, default_value = "lambert+phong", value_name = "SPEC|auto", help_heading = MODEL)]
+    pub(super) model: Wanted,
+    /// What is minimised; docs/fit.md has the formulas
+    #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2|log|cuberoot|relative", help_heading = MODEL)]
+    pub loss: Loss,
+    /// Let outliers count less; SCALE (1e-3 to 1e6) times the residuals' σ is where they begin [default SCALE: huber 1.345,
+    /// cauchy 2.385]
+    #[arg(long, value_name = "huber|cauchy[:SCALE]", help_heading = MODEL)]
+    pub robust: Option<Robust>,
+    /// How samples count
+    #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform", help_heading = SAMPLES)]
+    pub weights: WeightMode,
+    /// Weigh by the σ that the file states, instead of the solid angle
+    #[arg(long, conflicts_with = "weights", help_heading = SAMPLES)]
+    pub use_sigma: bool,
+    /// Leave out samples with θi or θo above this, degrees
+    #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true, help_heading = SAMPLES)]
+    pub max_angle: f64,
+    /// Use every N-th entry only
+    #[arg(long, default_value_t = 1, value_name = "N", help_heading = SAMPLES)]
+    pub stride: usize,
+    /// Let every channel have its own shapes
+    #[arg(long, help_heading = MODEL)]
+    pub per_channel: bool,
+    /// Hold a parameter at a value, phong.exponent=50 say; a second lobe of a kind is phong[1]; may be repeated for others
+    #[arg(long, value_name = "NAME=VALUE", value_parser = Limit::fixed, help_heading = MODEL)]
+    pub fix: Vec<Limit>,
+    /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated for others
+    #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range, help_heading = MODEL)]
+    pub bound: Vec<Limit>,
+    /// Fit under the constraint that no channel reflects more light than it receives
+    #[arg(long, help_heading = MODEL)]
+    pub conserve_energy: bool,
+    /// Time that the fit may take, bootstrap included, 50ms or 2s say: it uses as many samples as that allows
+    #[arg(long, value_name = "TIME", value_parser = parse_time, help_heading = EFFORT)]
+    pub time_budget: Option<Duration>,
+    /// Stop at a part of the samples once the rmse over all is within this share of the best (1%, say) with 95 % confidence
+    #[arg(long, value_name = "SHARE", value_parser = parse_share, allow_hyphen_values = true, help_heading = EFFORT)]
+    pub target_rmse_excess: Option<f64>,
+    /// Also find standard errors by redrawing the data N times; where a budget or target ends the fit early, the samples it ended with
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000), help_heading = EFFORT)]
+    pub bootstrap: Option<u32>,
+    /// Seed of the redrawing
+    #[arg(long, default_value_t = 0, requires = "bootstrap", value_name = "SEED", help_heading = EFFORT)]
+    pub seed: u64,
+    /// Where to write the fit of one measurement; `-` is stdout
+    #[arg(long, value_name = "FIT.json", conflicts_with = "out_dir", help_heading = OUTPUT)]
+    pub out: Option<PathBuf>,
+    /// Folder to write the fits of several measurements to, each under its own name
+    #[arg(long, value_name = "D", help_heading = OUTPUT)]
+    pub out_dir: Option<PathBuf>,
+    /// Print every step of the search on stderr
+    #[arg(long, help_heading = OUTPUT)]
+    pub log: bool,
+    #[command(flatten, next_help_heading = "Reading")]
+    pub reading: Reading,
+}
+
+/// A model, or the wish that one be chosen.
+#[derive(Debug, Clone)]
+pub(super) enum Wanted {
+    Auto,
+    Model(ModelSpec),
+}
+
+impl std::str::FromStr for Wanted {
+    type Err = SpecError;
+
+    fn from_str(text: &str) -> Result<Self, SpecError> {
+        if text == "auto" { Ok(Self::Auto) } else { text.parse().map(Self::Model) }
+    }
+}
+
+fn parse_loss(text: &str) -> Result<Loss, String> {
+    Loss::from_name(text).ok_or_else(|| format!("known are {}", Loss::ALL.map(Loss::name).join(", ")))
+}
+
+fn parse_weights(text: &str) -> Result<WeightMode, String> {
+    [WeightMode::SolidAngle, WeightMode::Uniform]
+        .into_iter()
+        .find(|w| w.name() == text)
+        .ok_or_else(|| "known are solid-angle, uniform".into())
+}
+
+/// `50ms` or `2s`.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    humantime::parse_duration(text).map_err(|_| "expected a time, 50ms or 2s say".into())
+}
+
+/// `1%` or `0.01`.
+fn parse_share(text: &str) -> Result<f64, String> {
+    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
+    let share: Option<f64> = number.trim().parse().ok().filter(|share: &f64| *share > 0.0 && share.is_finite());
+    share.map(|share| share * unit).ok_or_else(|| "expected a positive share, 1% or 0.01 say".into())
+}

@@ -1,0 +1,10 @@
+//! `goniofit fit`: an analytic model for each measurement.
+
+mod args;
+mod plan;
+mod print;
+mod run;
+
+pub(super) use args::Args;
+pub(super) use print::plus_minus;
+pub(super) use run::run;

@@ -1,0 +1,113 @@
+//! Robust fits: the scale s that they settle at, and what they say where it does not settle.
+
+use goniofit::brdf::Material;
+use goniofit::fit::{Datum, FitOptions, Loss, Robust, RobustKind};
+use goniofit::geometry::theta_of;
+use goniofit::gonio::{Instrument, Scan};
+use goniofit::measurement::Measurement;
+use goniofit::numeric::random::RngExt;
+use rayon::prelude::*;
+
+use crate::experiment::{Outliers, add_outliers};
+use crate::support::*;
+
+/// A small random table of one glossy lobe with 5 to 15 % of gross outliers.
+fn spoilt(seed: u64) -> Measurement {
+    let rng = &mut draws(seed);
+    let truth = material(&[0.4 * rng.random::<f64>()], &[0.05 + 0.5 * rng.random::<f64>()], 200f64.powf(rng.random()));
+    let scan = if rng.random() { Scan::InPlane { step_deg: 10.0 } } else { HEMISPHERE(20.0) };
+    let share = 0.05 + 0.1 * rng.random::<f64>();
+    let outliers = if rng.random() { Outliers::OneSided(share) } else { Outliers::Symmetric(share) };
+    let electrons = 10f64.powf(3.0 + 3.0 * rng.random::<f64>());
+    let mut m = measure(&truth, &Instrument { electrons, ..Instrument::default() }, &scan, seed);
+    add_outliers(&mut m, outliers, rng);
+    m
+}
+
+/// Residuals of the one channel and their weights, which average 1.
+fn residuals(m: &Measurement, of: &Material, o: &FitOptions) -> Vec<(f64, f64)> {
+    let within = |w| theta_of(w).to_degrees() <= o.max_angle_deg + 1e-9;
+    let one = |i: usize| {
+        let (wi, wo) = m.directions.pair(i);
+        let datum = Datum { value: m.values[i], cos_i: wi.z, epsilon: 0.0 };
+        let counts = within(wi) && within(wo) && o.loss.accepts(datum);
+        counts.then(|| (o.loss.residual(of.value(wi, wo)[0], datum), m.weights.get(i)))
+    };
+    let mut list: Vec<(f64, f64)> = (0..m.len()).step_by(o.stride).filter_map(one).collect();
+    let mean = list.iter().map(|(_, w)| w).sum::<f64>() / list.len() as f64;
+    list.iter_mut().for_each(|(_, w)| *w /= mean);
+    list
+}
+
+/// Σ w s² ρ(r²/s²).
+fn cost(list: &[(f64, f64)], kind: RobustKind, s: f64) -> f64 {
+    list.iter().map(|(r, w)| w * s * s * kind.rho((r / s).powi(2)).0).sum()
+}
+
+/// 1.4826 × the median absolute deviation from the median.
+fn spread(list: &[(f64, f64)]) -> f64 {
+    let median = |mut v: Vec<f64>| {
+        v.sort_by(f64::total_cmp);
+        0.5 * (v[v.len() / 2] + v[(v.len() - 1) / 2])
+    };
+    let centre = median(list.iter().map(|(r, _)| *r).collect());
+    1.482_602_218_505_602 * median(list.iter().map(|(r, _)| (r - centre).abs()).collect())
+}
+
+/// By how much a robust fit with a lobe more is worse than the one that it contains, at the s of the latter; as a share of the cost.
+/// Of its own s alone nothing follows: a lobe more may move the median residual either way.
+fn excess(m: &Measurement, o: &FitOptions, smaller: &str, larger: &str) -> f64 {
+    let at = |model: &str| solved(m, &FitOptions { model: options(model).model, ..o.clone() });
+    let (smaller, larger) = (at(smaller), at(larger));
+    let kind = o.robust.expect("robust").kind;
+    let s = record(&smaller).robust_scale[0];
+    let least = cost(&residuals(m, &smaller, o), kind, s);
+    assert!(rel(least, record(&smaller).cost) < 1e-6, "{least:e} {:e}", record(&smaller).cost);
+    cost(&residuals(m, &larger, o), kind, s) / least - 1.0
+}
+
+#[test]
+fn a_lobe_more_is_never_worse_than_the_robust_fit_that_it_contains() {
+    let chains = [("lambert", "lambert+phong"), ("phong", "phong+phong"), ("lambert+phong", "lambert+phong+phong")];
+    let one = |seed: u64| {
+        let m = spoilt(seed);
+        let mut said = Vec::new();
+        for (kind, loss) in RobustKind::ALL.into_iter().flat_map(|k| [Loss::CosineL2, Loss::Log].map(|l| (k, l))) {
+            let o = FitOptions { loss, robust: robust(kind), ..options("lambert") };
+            let excesses = chains.map(|(smaller, larger)| excess(&m, &o, smaller, larger));
+            said.extend(
+                excesses.iter().zip(chains).map(|(e, (_, l))| (*e, format!("seed {seed} {kind:?} {loss:?} {l}"))),
+            );
+        }
+        said
+    };
+    let mut all: Vec<(f64, String)> = (0..60).into_par_iter().flat_map_iter(one).collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (excess, case) in &all[..10] {
+        println!("{case}: cost higher by {:.3} %", 100.0 * excess);
+    }
+    assert!(all[0].0 < WORSE, "{all:?}");
+}
+
+/// What a descent leaves undone, as a share of the cost.
+const WORSE: f64 = 1e-6;
+
+/// Fifteen values drawn as squares of random numbers, a scale far below the noise: no s is the one that its own fit's residuals ask for.
+#[test]
+fn a_scale_that_can_not_settle_is_said_to_be_so_with_what_the_residuals_ask_for() {
+    let rng = &mut draws(939);
+    let mut m = measure(&material(&[0.3], &[0.3], 20.0), &Instrument::noiseless(), &HEMISPHERE(30.0), 939);
+    m.values.iter_mut().for_each(|v| *v *= rng.random::<f64>().powi(2));
+    let asked = Robust { kind: RobustKind::Cauchy, scale: 0.3 };
+    let o = FitOptions { robust: Some(asked), stride: 5, ..options("lambert") };
+    let got = solved(&m, &o);
+    let used = record(&got).robust_scale[0];
+    let left = (0.3 * spread(&residuals(&m, &got, &o)) / used - 1.0).abs();
+    let said = record(&got).warnings.iter().find(|w| w.starts_with("the robust scale has not settled"));
+    let said = said.unwrap_or_else(|| panic!("{:?}", record(&got).warnings));
+    println!("{said}");
+    assert!(left > 1e-3 && said.contains(&format!("differs by {:.1e} %", 100.0 * left)), "{left:e}: {said}");
+    // At the usual scale it settles, and nothing is said.
+    let usual = solved(&m, &FitOptions { robust: robust(RobustKind::Cauchy), ..o });
+    assert!(!record(&usual).warnings.iter().any(|w| w.contains("settled")), "{:?}", record(&usual).warnings);
+}
