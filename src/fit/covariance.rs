@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::folded::{OnLines, Products, Residuals};
 use super::leverage::Leveraged;
-use super::loss::Datum;
+use super::loss::{Datum, Robust};
 use super::merl_lines::{Line, MerlLines};
-use super::outliers::Outliers;
+use super::offset;
+use super::outliers::{self, Outliers};
 use super::part::SMALL;
 use super::passes::{Moments, Projected, Scratch};
 use super::reduced::{Problem, Solution};
@@ -46,8 +47,12 @@ pub(super) struct Uncertainty {
     pub neighbours: Neighbours,
     /// Σ w σ_r² over samples and channels with a stated σ, and how many there are.
     pub stated: (f64, usize),
+    /// How clearly the fit is off the data's mean, in standard deviations, where it is.
+    pub offset: Option<f64>,
     /// Number of gross outliers, where they lean to one side.
     pub leaning: Option<usize>,
+    /// Parameters whose error is for the most part that of samples which say nothing of their own noise.
+    pub by_others: Vec<usize>,
     /// Half width of each parameter's 95 % interval over its standard error: Student's t, and what leverage asks for.
     pub reach: Vec<f64>,
 }
@@ -89,7 +94,12 @@ struct Piece {
 }
 
 /// Standard errors at a solution. `moments` are the sums of A where they are known.
-pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<&Moments>) -> Uncertainty {
+pub(super) fn uncertainty(
+    problem: &Problem<'_>,
+    at: &Solution,
+    moments: Option<&Moments>,
+    robust: Option<Robust>,
+) -> Uncertainty {
     let samples = problem.samples;
     let (channels, lobes, shapes) = (at.weights.len(), problem.kinds.len(), problem.layout.len());
     let n = samples.residuals();
@@ -98,7 +108,8 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     let freedom = n as f64 - pinned.iter().filter(|p| !**p).count() as f64;
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
     let start = || Piece::new(problem, at);
-    let add = |part: &mut Piece, block: &Block| part.add(problem, at, block, moments.is_none());
+    let gross = outliers::gross(robust, problem.saturation.map_or(1.0, |(_, s)| s));
+    let add = |part: &mut Piece, block: &Block| part.add(problem, at, block, moments.is_none(), gross);
     let add_lines = |part: &mut Piece, lines: &MerlLines, block: &[Line]| part.add_lines(problem, at, lines, block);
     let folded = moments.and_then(|_| samples.map_lines(start, add_lines));
     let mut parts = folded.unwrap_or_else(|| samples.map_pieces(start, add));
@@ -149,17 +160,30 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
     }
     let sandwich = Sandwich::new(&normal, &pinned, &limited(problem, at, &pinned));
     let shared: Vec<_> = common.iter().cloned().chain([outliers.shared(&sandwich.bread)]).collect();
-    let covariance = sandwich.covariance(&(&known + by_residuals * inflation), &shared);
+    let mut spread = &known + by_residuals * inflation;
+    let told_by_residuals = problem.saturation.is_some() || stated.1 < n;
+    let leveraged =
+        (n <= SMALL && freedom > 0.0 && told_by_residuals).then(|| Leveraged::new(problem, at, &sandwich.bread));
+    if let Some(leveraged) = &leveraged {
+        spread += &leveraged.lone;
+    }
+    let covariance = sandwich.covariance(&spread, &shared);
     let leaning = outliers.lean(&sandwich.bread).then_some(outliers.count);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
-    let told_by_residuals = problem.saturation.is_some() || stated.1 < n;
-    let reach = if n <= SMALL && freedom > 0.0 && told_by_residuals {
-        let certain = sandwich.covariance(&known, &shared).diagonal();
-        Leveraged::new(problem, at, &sandwich.bread).reach(&certain, &covariance.diagonal(), freedom)
-    } else {
-        vec![student_quantile(0.975, freedom.max(1.0)); parameters]
+    let (mut reach, by_others) = match leveraged {
+        Some(leveraged) => {
+            let certain = sandwich.covariance(&known, &shared).diagonal();
+            (leveraged.reach(&certain, &covariance.diagonal(), freedom), leveraged.by_others(&certain))
+        }
+        None => (vec![student_quantile(0.975, freedom.max(1.0)); parameters], Vec::new()),
     };
+    let offset = offset::offset(problem, at);
+    if let Some(offset) = &offset {
+        let moved = &sandwich.bread * &offset.pull;
+        let wider = |i: usize| (1.0 + moved[i] * moved[i] / covariance[(i, i)]).sqrt();
+        reach.iter_mut().enumerate().for_each(|(i, r)| *r *= if moved[i] == 0.0 { 1.0 } else { wider(i) });
+    }
     let grouped = sandwich.covariance(&(clusters * (count as f64 / (count as f64 - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&drawn, &[]);
     let design_effect = (&normal * &grouped).trace() / (&normal * &drawn).trace();
@@ -175,7 +199,9 @@ pub(super) fn uncertainty(problem: &Problem<'_>, at: &Solution, moments: Option<
         bread: sandwich.bread,
         neighbours,
         stated,
+        offset: offset.map(|offset| offset.score),
         leaning,
+        by_others,
         reach,
     }
 }
@@ -273,8 +299,8 @@ impl Piece {
         Self { channels: vec![sums; channels], clusters, count: 0, residuals: Residuals::default() }
     }
 
-    /// Adds all sums over one block; `bread` says whether A is among them.
-    fn add(&mut self, problem: &Problem<'_>, at: &Solution, block: &Block, bread: bool) {
+    /// Adds all sums over one block; `bread` says whether A is among them, `gross` from which residual one is an outlier.
+    fn add(&mut self, problem: &Problem<'_>, at: &Solution, block: &Block, bread: bool, gross: f64) {
         let channels = at.weights.len();
         self.residuals.scratch.basis(&block.x, &at.lobes);
         let clusters: Vec<std::ops::Range<usize>> = problem.samples.clusters(block);
@@ -286,6 +312,7 @@ impl Piece {
             sums.neighbours.add(&Neighbours::of(&scratch.r, &scratch.trust, w, pairs));
             sums.dark |= vectorised(Dark(&block.x, w)) > 0.0;
             let gradient = sums.add(problem, block, c, scratch, bread);
+            sums.outliers.add(scratch, gross);
             let (strength, place) = (problem.strength(x), problem.place(channels, c));
             if clusters.len() == 1 {
                 place.iter().enumerate().for_each(|(i, p)| scores[0][*p] += strength[i] * gradient[i]);
@@ -402,7 +429,6 @@ impl ChannelSums {
             }
         }
         scratch.tally(k, &mut gradient, &mut self.spread);
-        self.outliers.add(scratch, problem.saturation);
         for (component, total) in self.common.iter_mut().enumerate() {
             let u = measurement.common_plane(component, own);
             let trust = |i: usize| scratch.trust.get(i).copied().unwrap_or(1.0);

@@ -85,7 +85,10 @@ fn mark(
                 open.extend([c * lobes + diffuse, c * lobes + lobe, shape]);
             }
         }
-        if low < high && problem.is_invisible(*lobe, high) && (unproved(*lobe) || as_good(i, high)) {
+        // Where a sharper one than can be searched does as well, on samples right at the peak, only weight × exponent is known.
+        let searched = high >= parameter.bounds.1.ln();
+        let unseen = problem.is_invisible(*lobe, high);
+        if low < high && (unseen && unproved(*lobe) || (unseen || searched) && as_good(i, high)) {
             open.push(shape);
             open.extend((0..channels).map(|c| c * lobes + lobe));
         }

@@ -68,7 +68,7 @@ pub(super) fn by_passes(
     let residuals = problem.samples.residuals();
     let is_large = residuals > SMALL;
     let is_rounding = at.cost <= ROUNDING * ROUNDING * residuals as f64;
-    if is_rounding || is_large && (problem.cap.is_some() || !joint::is_small(problem)) {
+    if is_rounding || is_large && (problem.cap.is_some() || !joint::has_few_parameters(problem)) {
         return (plain(problem, at, uncertainty), None);
     }
     let (tolerance, tries) = if is_large { (CLOSE_LARGE, TRIES_LARGE) } else { (CLOSE, TRIES) };

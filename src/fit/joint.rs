@@ -48,7 +48,7 @@ pub(super) fn polish(
     let parameters = channels * lobes + problem.layout.len();
     let only_cost = matches!(digits, Digits::Cost(_));
     let capped = |c: usize| problem.feasible(c).free_at(&start.weights[c]).1;
-    if !is_small(problem) || only_cost && problem.cap.is_some() || (0..channels).any(capped) {
+    if !has_few_parameters(problem) || only_cost && problem.cap.is_some() || (0..channels).any(capped) {
         return None;
     }
     let dense = !only_cost && problem.samples.residuals() * parameters <= LARGEST;
@@ -64,11 +64,14 @@ pub(super) fn polish(
     let lm = LevenbergMarquardt::new(options).with_bounds(ranges);
     let p = start.weights.iter().flat_map(|x| x.iter().copied()).chain(start.t.iter().copied());
     let found = solver::minimize(&joint, lm, DVector::from_iterator(parameters, p), steps);
-    Some(found.map(|outcome| (joint.solution(&outcome.parameters, outcome.cost), outcome)))
+    let found = found.map(|outcome| (joint.solution(&outcome.parameters, outcome.cost), outcome));
+    // The ranges know nothing of the cap: a step may have gone beyond it.
+    let within = |x: &DVector<f64>| problem.cap.is_none_or(|cap| x.sum() <= cap);
+    Some(found).filter(|found| found.as_ref().map_or(true, |(at, _)| at.weights.iter().all(within)))
 }
 
 /// Whether the parameters are few enough to be searched together.
-pub(super) fn is_small(problem: &Problem<'_>) -> bool {
+pub(super) fn has_few_parameters(problem: &Problem<'_>) -> bool {
     problem.ranges.len() * problem.kinds.len() + problem.layout.len() <= MOST
 }
 

@@ -214,14 +214,6 @@ impl RobustKind {
         }
     }
 
-    /// A residual beyond this multiple of s is a gross outlier: 9.5 σ at the usual scale, which no noise reaches.
-    pub(super) fn gross(self) -> f64 {
-        match self {
-            Self::Huber => 7.0,
-            Self::Cauchy => 4.0,
-        }
-    }
-
     /// The usual multiple of σ: 95 % efficiency for normal noise.
     #[must_use]
     pub fn default_scale(self) -> f64 {

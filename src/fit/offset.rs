@@ -1,9 +1,15 @@
 //! Does the fit follow the mean of the data? A loss that is not linear in the measured value, or weights that follow its noise, pull a
-//! fit off the mean, by more than its standard errors where the noise is not small. The residuals tell: if the model can
-//! describe the data their sums over each lobe are 0 within their own scatter, whatever weights the fit has used. Each residual is weighed
-//! by its neighbour's weight, which is about as good as its own and knows nothing of its noise.
+//! fit off the mean, by more than its standard errors where the noise is not small. The residuals tell.
+//!
+//! *Weights by σ:* each residual is weighed anew by its neighbour's w, which is about as good as its own and knows nothing of its noise. By what
+//! the weighted residuals change their sum over each parameter's slope is off 0: that is chance of both signs, unless w follows the noise.
+//! *Losses that bend:* if the model can describe the data the sums Σ W φ (f − y) are 0 within their own scatter for any W that knows
+//! nothing of the noise: the neighbour's w c², and w times the loss's squared slope at the model's value, which is what the fit itself would
+//! weigh by if there were no noise.
 
-use super::loss::Loss;
+use nalgebra::DVector;
+
+use super::loss::{Datum, Loss};
 use super::passes::Scratch;
 use super::reduced::{Problem, Solution};
 use super::samples::Block;
@@ -11,43 +17,112 @@ use super::samples::Block;
 /// Standard deviations from which on a sum is not 0 by chance, among a dozen of them.
 const CLEARLY_OFF: f64 = 3.5;
 
-/// How many standard deviations Σ w c² φ (f − y) is off 0, for the lobe and channel where that is most; `None` where it may be chance, and for
-/// fits that follow the mean by construction or are not meant to.
-pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<f64> {
+/// How a fit is off the mean of its data.
+pub(super) struct Offset {
+    /// By how many standard deviations.
+    pub score: f64,
+    /// What weights that follow the noise add to half the cost's gradient, by all parameters; 0 where they don't.
+    pub pull: DVector<f64>,
+}
+
+/// How the fit is off the mean; `None` where what is seen may be chance, and for fits that follow the mean by construction or are not
+/// meant to.
+pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<Offset> {
     let samples = problem.samples;
     let bends = !samples.loss.is_linear() || samples.loss == Loss::Relative;
-    if problem.saturation.is_some() || !(bends || samples.weighting == "sigma") {
+    let by_sigma = samples.weighting == "sigma";
+    if problem.saturation.is_some() || !(bends || by_sigma) {
         return None;
     }
-    let lobes = problem.kinds.len();
-    let zero = vec![(0.0, 0.0); at.weights.len() * lobes];
-    let add = |(sums, scratch): &mut (Vec<(f64, f64)>, Scratch), block: &Block| {
-        scratch.basis(&block.x, &at.lobes);
-        for (c, x) in at.weights.iter().enumerate() {
-            scratch.model(x);
-            let (w, y) = (block.weight(c), &block.y[c]);
-            for i in (0..block.len()).filter(|&i| w[i] > 0.0) {
-                let Some(neighbour) = neighbour(block, i).map(|k| w[k]) else { continue };
-                let residual = neighbour * block.cos_i[i] * block.cos_i[i] * (scratch.f[i] - y[i]);
-                for (l, (sum, square)) in sums[c * lobes..(c + 1) * lobes].iter_mut().enumerate() {
-                    let term = residual * scratch.columns[l][i];
-                    *sum += term;
-                    *square += term * term;
+    let channels = at.weights.len();
+    let parameters = channels * problem.kinds.len() + problem.layout.len();
+    let zero =
+        Sums { follow: vec![(0.0, 0.0); parameters], mean: vec![[(0.0, 0.0); 2]; channels * problem.kinds.len()] };
+    let parts = samples.map_pieces(
+        || (zero.clone(), Scratch::default()),
+        |(sums, scratch), block| {
+            scratch.basis(&block.x, &at.lobes);
+            for c in 0..channels {
+                scratch.residuals(samples, block, c, &at.weights[c], None);
+                if by_sigma {
+                    sums.follow(problem, at, block, c, scratch);
+                }
+                if bends {
+                    sums.mean(problem, block, c, scratch);
                 }
             }
-        }
-    };
-    let parts = samples.map_pieces(|| (zero.clone(), Scratch::default()), add);
-    let total = |k: usize| parts.iter().fold((0.0, 0.0), |(a, b), (sums, _)| (a + sums[k].0, b + sums[k].1));
+        },
+    );
+    let mut sums = zero;
+    parts.iter().for_each(|(part, _)| sums.merge(part));
     // A weight that stands at an end of its range leaves a sum over its lobe, rightly.
+    let lobes = problem.kinds.len();
     let free = |k: &usize| {
         let (low, high) = problem.ranges[k / lobes][k % lobes];
         let x = at.weights[k / lobes][k % lobes];
         low < x && x < high
     };
-    let score = |(sum, square): (f64, f64)| if square > 0.0 { f64::abs(sum) / f64::sqrt(square) } else { 0.0 };
-    let most = (0..zero.len()).filter(free).map(|k| score(total(k))).fold(0.0, f64::max);
-    (most > CLEARLY_OFF).then_some(most)
+    let follow = sums.follow.iter().map(|s| score(*s)).fold(0.0, f64::max);
+    let mean = (0..sums.mean.len()).filter(free).flat_map(|k| sums.mean[k].map(score)).fold(0.0, f64::max);
+    let clearly = if follow > CLEARLY_OFF { 1.0 } else { 0.0 };
+    let pull = DVector::from_iterator(parameters, sums.follow.iter().map(|s| clearly * s.0));
+    Some(Offset { score: follow.max(mean), pull }).filter(|offset| offset.score > CLEARLY_OFF)
+}
+
+/// A sum and that of its terms' squares.
+type Sum = (f64, f64);
+
+fn score((sum, square): Sum) -> f64 {
+    if square > 0.0 { sum.abs() / square.sqrt() } else { 0.0 }
+}
+
+#[derive(Clone)]
+struct Sums {
+    /// By each parameter: Σ (w′/w − 1) · pull · slope, w′ the neighbour's.
+    follow: Vec<Sum>,
+    /// Of each channel's lobes: Σ W φ (f − y) for two kinds of W.
+    mean: Vec<[Sum; 2]>,
+}
+
+impl Sums {
+    fn merge(&mut self, other: &Self) {
+        let add = |(to, from): (&mut Sum, &Sum)| *to = (to.0 + from.0, to.1 + from.1);
+        self.follow.iter_mut().zip(&other.follow).for_each(add);
+        self.mean.iter_mut().flatten().zip(other.mean.iter().flatten()).for_each(add);
+    }
+
+    fn follow(&mut self, problem: &Problem<'_>, at: &Solution, block: &Block, channel: usize, scratch: &Scratch) {
+        let (place, strength) = (problem.place(at.weights.len(), channel), problem.strength(&at.weights[channel]));
+        let w = block.weight(channel);
+        for i in (0..block.len()).filter(|&i| w[i] > 0.0) {
+            let Some(other) = neighbour(block, i).map(|k| w[k]).filter(|w| *w > 0.0) else { continue };
+            let more = (other / w[i] - 1.0) * scratch.pull[i];
+            for ((column, strength), place) in scratch.columns.iter().zip(&strength).zip(&place) {
+                add(&mut self.follow[*place], more * strength * column[i]);
+            }
+        }
+    }
+
+    fn mean(&mut self, problem: &Problem<'_>, block: &Block, channel: usize, scratch: &Scratch) {
+        let (samples, lobes) = (problem.samples, problem.kinds.len());
+        let (w, y) = (block.weight(channel), &block.y[channel]);
+        for i in (0..block.len()).filter(|&i| w[i] > 0.0) {
+            let (f, cos_i) = (scratch.f[i], block.cos_i[i]);
+            let as_modelled = Datum { value: f, cos_i, epsilon: samples.epsilon[channel] };
+            let own = w[i] * samples.loss.slope(f, as_modelled).powi(2);
+            let others = neighbour(block, i).map_or(0.0, |k| w[k] * cos_i * cos_i);
+            for (l, sums) in self.mean[channel * lobes..(channel + 1) * lobes].iter_mut().enumerate() {
+                let term = scratch.columns[l][i] * (f - y[i]);
+                add(&mut sums[0], others * term);
+                // An infinite slope has no say.
+                add(&mut sums[1], if own.is_finite() { own * term } else { 0.0 });
+            }
+        }
+    }
+}
+
+fn add(to: &mut Sum, term: f64) {
+    *to = (to.0 + term, to.1 + term * term);
 }
 
 /// A sample beside sample `i` of a block.

@@ -4,7 +4,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::passes::{Projected, Saturation, Scratch};
+use super::loss::Robust;
+use super::passes::{Projected, Scratch};
 use crate::numeric::simd::vectorised;
 
 /// Pulls of gross outliers, of one channel's bare columns or of all parameters.
@@ -23,10 +24,8 @@ impl Outliers {
         Self { pull: DVector::zeros(parameters), squares: DMatrix::zeros(parameters, parameters), count: 0 }
     }
 
-    /// Adds those of a block whose residuals and columns are there.
-    pub fn add(&mut self, scratch: &mut Scratch, saturation: Saturation) {
-        let Some((kind, s)) = saturation else { return };
-        let gross = s * kind.gross();
+    /// Adds those of a block, whose residuals and columns are there: residuals beyond `gross`.
+    pub fn add(&mut self, scratch: &mut Scratch, gross: f64) {
         let outlier = |(r, pull): (&f64, &f64)| if r.abs() > gross { *pull } else { 0.0 };
         let pulls: Vec<f64> = scratch.r.iter().zip(&scratch.pull).map(outlier).collect();
         let found = pulls.iter().filter(|p| **p != 0.0).count();
@@ -67,5 +66,13 @@ impl Outliers {
     }
 }
 
-/// Three standard deviations of pulls of random signs.
+/// A residual of more σ than this is a gross outlier: no noise reaches it.
+const GROSS: f64 = 9.5;
+
+/// The residual from which one is a gross outlier, where s has settled at a multiple of the residuals' σ.
+pub(super) fn gross(robust: Option<Robust>, s: f64) -> f64 {
+    robust.map_or(f64::INFINITY, |robust| GROSS * s / robust.scale)
+}
+
+/// Three standard deviations of pulls of random signs, in one direction; of many parameters the excess scatters less.
 const LEANING: f64 = 9.0;

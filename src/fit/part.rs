@@ -8,7 +8,6 @@ use super::identify;
 use super::intervals::{self, Intervals};
 use super::joint::{self, Digits};
 use super::limits::Ranges;
-use super::offset;
 use super::options::{FitError, FitOptions};
 use super::passes::{self, Saturation};
 use super::quadratic;
@@ -47,8 +46,6 @@ pub(super) struct Part {
     pub structure: Option<Structure>,
     /// Whether noise could not be told from model error although there are residuals.
     pub unjudged: bool,
-    /// How clearly the fit is off the data's mean, in standard deviations, where it is.
-    pub offset: Option<f64>,
     /// Whether the energy limit decides a channel's weights, channel by channel.
     pub capped: Vec<bool>,
     pub stop: Stop,
@@ -69,6 +66,7 @@ impl Part {
         (dark.samples, dark.counts, dark.refused) = (0, vec![0; channels.len()], 0);
         dark.solution.cost = 0.0;
         dark.uncertainty.errors.fill(None);
+        (dark.uncertainty.leaning, dark.uncertainty.by_others, dark.unsettled) = (None, Vec::new(), None);
         dark.uncertainty.structured.fill(0.0);
         dark.intervals.fill(None);
         for (own, &channel) in channels.iter().enumerate() {
@@ -81,7 +79,7 @@ impl Part {
         }
         dark.at_end.fill(false);
         dark.capped.fill(false);
-        (dark.structure, dark.unjudged, dark.offset) = (None, false, None);
+        (dark.structure, dark.unjudged, dark.uncertainty.offset) = (None, false, None);
         (dark.history, dark.report) = (Vec::new(), SearchReport::default());
         (dark.subset, dark.bootstrap) = (None, None);
         dark
@@ -146,7 +144,7 @@ fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Part, FitError
         solution = last_digits(search, solution, options)?;
     }
     let moments = search.moments(&solution.lobes, true);
-    let mut uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments));
+    let mut uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments), None);
     identify::by_search(search, &solution, &mut uncertainty);
     solution.cost = uncertainty.cost;
     let intervals = intervals::by_search(search, &solution, &uncertainty);
@@ -238,7 +236,7 @@ fn judge(
     options: &FitOptions,
 ) -> Result<Judged, FitError> {
     let (solution, outcome) = descend(problem, start, options.max_iterations, Digits::All)?;
-    let mut uncertainty = covariance::uncertainty(problem, &solution, None);
+    let mut uncertainty = covariance::uncertainty(problem, &solution, None, options.robust);
     let mut part = problem.on(more.samples);
     part.saturation = problem.saturation;
     identify::by_passes(&part, &solution, &mut uncertainty);
@@ -290,7 +288,7 @@ fn finish(
     problem: &Problem<'_>,
     solution: Solution,
     mut uncertainty: Uncertainty,
-    intervals: Intervals,
+    mut intervals: Intervals,
     found: start::Found,
 ) -> Result<Part, FitError> {
     if !solution.cost.is_finite() {
@@ -311,6 +309,12 @@ fn finish(
     let at_end: Vec<bool> = (weights..uncertainty.errors.len())
         .map(|i| intervals::is_at_end(problem, &solution, &uncertainty, i))
         .collect();
+    for (i, (low, high)) in problem.bounds.iter().enumerate().filter(|(_, (low, high))| low < high) {
+        // An interval over all that is searched is no answer.
+        if intervals[weights + i].is_some_and(|(a, b)| a <= *low && b >= *high) {
+            (uncertainty.errors[weights + i], intervals[weights + i]) = (None, None);
+        }
+    }
     let errors = uncertainty.errors[weights..].iter_mut();
     errors.zip(&at_end).filter(|(_, ends)| **ends).for_each(|(error, _)| *error = None);
     Ok(Part {
@@ -325,7 +329,6 @@ fn finish(
         bounds: problem.bounds.clone(),
         unjudged: rmse > ROUNDING && structure.is_none() && residuals > uncertainty.errors.len(),
         structure,
-        offset: offset::offset(problem, &solution),
         capped,
         saturation: problem.saturation,
         unsettled: None,

@@ -68,22 +68,10 @@ impl<'a> Trail<'a> {
         let shape = |(i, t): (usize, &f64)| place(weights + i, *t, held.bounds[i]);
         let t: Vec<f64> = self.at.t.iter().enumerate().map(shape).collect();
         let of = |(c, x): (usize, &DVector<f64>)| {
-            below_cap(held, c, DVector::from_fn(lobes, |l, _| place(c * lobes + l, x[l], held.ranges[c][l])))
+            held.within(c, DVector::from_fn(lobes, |l, _| place(c * lobes + l, x[l], held.ranges[c][l])))
         };
         let weights = self.at.weights.iter().enumerate().map(of).collect();
         Solution { lobes: held.shaped(&t), t, weights, cost: f64::NAN }
-    }
-}
-
-/// Weights of a channel, each less by its part of what their sum is above the cap.
-fn below_cap(problem: &Problem<'_>, channel: usize, x: DVector<f64>) -> DVector<f64> {
-    let slack = |l: usize| x[l] - problem.ranges[channel][l].0;
-    let all: f64 = (0..x.len()).map(slack).sum();
-    match problem.cap.map(|cap| x.sum() - cap) {
-        Some(over) if over > 0.0 && all > 0.0 => {
-            DVector::from_fn(x.len(), |l, _| x[l] - (over / all).min(1.0) * slack(l))
-        }
-        _ => x,
     }
 }
 

@@ -123,6 +123,20 @@ impl<'a> Problem<'a> {
         Feasible { ranges: &self.ranges[channel], cap: self.cap }
     }
 
+    /// Weights of a channel as they may be: in their ranges, and each less by its part of what their sum is above the cap.
+    pub fn within(&self, channel: usize, x: DVector<f64>) -> DVector<f64> {
+        let ranges = &self.ranges[channel];
+        let x = x.map_with_location(|l, _, x| x.clamp(ranges[l].0, ranges[l].1));
+        let slack = |l: usize| x[l] - ranges[l].0;
+        let all: f64 = (0..x.len()).map(slack).sum();
+        match self.cap.map(|cap| x.sum() - cap) {
+            Some(over) if over > 0.0 && all > 0.0 => {
+                DVector::from_fn(x.len(), |l, _| x[l] - (over / all).min(1.0) * slack(l))
+            }
+            _ => x,
+        }
+    }
+
     /// What the bare columns of a channel are multiplied by: 1 for the lobes themselves, the lobe's weight for its slopes.
     pub fn strength(&self, x: &DVector<f64>) -> Vec<f64> {
         std::iter::repeat_n(1.0, x.len()).chain(self.layout.iter().map(|(lobe, _)| x[*lobe])).collect()

@@ -58,17 +58,13 @@ impl<'a> Streamed<'a> {
 
     /// Weights to begin with: [`FIRST_WEIGHT`] each, where the ranges and the cap let it be.
     fn first_weights(&self) -> Vec<DVector<f64>> {
-        let lobes = self.problem.kinds.len();
-        let share = self.problem.cap.map_or(FIRST_WEIGHT, |cap| FIRST_WEIGHT.min(cap / lobes as f64));
-        let within = |range: &(f64, f64)| share.clamp(range.0, range.1);
-        let channel = |ranges: &Vec<(f64, f64)>| DVector::from_iterator(lobes, ranges.iter().map(within));
-        self.problem.ranges.iter().map(channel).collect()
+        vec![DVector::from_element(self.problem.kinds.len(), FIRST_WEIGHT); self.problem.ranges.len()]
     }
 
     fn descend(&self, t: &[f64], lobes: Vec<ShapedLobe>, start: Vec<DVector<f64>>) -> Solution {
         let problem = self.problem;
         let evaluate = |x: &[DVector<f64>]| passes::sums(problem.samples, &lobes, x, problem.saturation, Want::Weights);
-        let mut x = start;
+        let mut x: Vec<_> = start.into_iter().enumerate().map(|(c, x)| problem.within(c, x)).collect();
         let mut at = evaluate(&x);
         let mut damping = vec![0.0f64; x.len()];
         for _ in 0..INNER_STEPS {

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use goniofit::fit::{Limit, RobustKind};
-use goniofit::gonio::Scan;
+use goniofit::fit::{FitOptions, Limit, Robust, RobustKind};
+use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::formats::{self, ReadOptions};
 use rayon::prelude::*;
 
@@ -162,4 +162,69 @@ fn a_huber_fit_pulled_to_one_side_says_how_far() {
     assert!((0..3).all(|p| held.iter().filter(|h| h[p]).count() >= 35), "{held:?}");
     let got = solved(&cell.measure([0.3, 0.2, 40.0], 0), &cell.options());
     assert!(record(&got).warnings.iter().any(|w| w.contains("lean to one side")), "{:?}", record(&got).warnings);
+}
+
+/// Two channels share an exponent and one has few samples of its own, or no more than it has weights: its noise is then the other's.
+#[test]
+fn intervals_of_a_channel_of_few_samples_hold_the_truth() {
+    let truth = material(&[0.3, 0.2], &[0.1, 0.1], 20.0);
+    let scan = Scan::InPlane { step_deg: 5.0 };
+    for few in [2, 3, 4, 6] {
+        let seeds = 150;
+        let mut held = [0; 2];
+        for seed in 0..seeds {
+            let mut m = exact(&truth, &scan);
+            let mut rng = draws(1000 * few + seed);
+            m.values.iter_mut().for_each(|v| *v += 3e-3 * normal(&mut rng));
+            // Of the first channel the mirror direction of 15° and what stands apart from it.
+            let kept: Vec<usize> = (0..few as usize).map(|k| 35 + 17 - 3 + 7 * k).collect();
+            (0..m.len()).filter(|i| !kept.contains(i)).for_each(|i| m.values[i] = f64::NAN);
+            let got = solved(&m, &options("lambert+phong"));
+            for (l, truth) in [(0, 0.3), (1, 0.1)] {
+                let interval = record(&got).interval_95[l].weight[0];
+                held[l] += u64::from(interval.is_none_or(|(low, high)| (low..=high).contains(&truth)));
+            }
+        }
+        println!("{few} samples: {held:?} of {seeds}");
+        // 95 % of 150 is 142.5, four standard deviations below 131.
+        assert!(held.iter().all(|h| *h >= 131), "{few} samples: {held:?} of {seeds}");
+    }
+}
+
+/// The tails of skew noise are no gross outliers, however small the scale of the loss.
+#[test]
+fn clean_samples_are_no_gross_outliers_at_a_small_scale() {
+    let truth = material(&[0.3], &[0.2], 20.0);
+    let mut m = exact(&truth, &HEMISPHERE(10.0));
+    let mut rng = draws(3);
+    m.values.iter_mut().for_each(|v| *v += 1e-3 * -goniofit::numeric::random::RngExt::random::<f64>(&mut rng).ln());
+    for scale in [0.1, 0.3, 1.345] {
+        let o = FitOptions { robust: Some(Robust { kind: RobustKind::Huber, scale }), ..options("lambert+phong") };
+        let warnings = &record(&solved(&m, &o)).warnings.clone();
+        let many = warnings.iter().find(|w| w.contains("gross outliers"));
+        // Of 2,600 exponential draws a few lie beyond 9.5 σ of the median absolute deviation.
+        let count = many.map_or(0, |w| w.split(' ').next().and_then(|n| n.parse().ok()).unwrap_or(usize::MAX));
+        assert!(count < 40, "{scale}: {warnings:?}");
+    }
+}
+
+/// Weights by a σ that follows the noise pull the fit; the intervals know how far.
+#[test]
+fn intervals_allow_for_a_sigma_that_follows_the_noise() {
+    let truth = material(&[0.32, 0.06, 0.035], &[0.12; 3], 90.0);
+    let o = FitOptions { use_sigma: true, ..options("lambert+phong") };
+    for electrons in [1e3, 1e4, 1e5] {
+        let seeds = 30;
+        let mut held = [0; 3];
+        for seed in 0..seeds {
+            let instrument = Instrument { electrons, ..Instrument::default() };
+            let got = solved(&measure(&truth, &instrument, &HEMISPHERE(10.0), seed), &o);
+            for (c, kd) in [0.32, 0.06, 0.035].into_iter().enumerate() {
+                let (low, high) = record(&got).interval_95[0].weight[c].expect("determined");
+                held[c] += u64::from((low..=high).contains(&kd));
+            }
+        }
+        println!("{electrons:e} electrons: {held:?} of {seeds}");
+        assert!(held.iter().all(|h| *h >= 24), "{electrons:e} electrons: {held:?} of {seeds}");
+    }
 }

@@ -168,3 +168,26 @@ fn a_held_weight_stays_known_where_the_samples_stand_at_too_few_places() {
     assert_eq!(errors(&got)[1], Some(0.0));
     assert!(open.contains(&"phong.exponent".to_owned()), "{open:?}");
 }
+
+/// A lobe so narrow that no sample beside the mirror direction sees it: noise there may ask for one exponent or another, but the data
+/// know weight × exponent alone.
+#[test]
+fn a_lobe_seen_in_the_mirror_direction_alone_has_no_exponent() {
+    let truth = material(&[0.01, 0.01, 0.01], &[0.75, 0.7, 0.6], 2e4);
+    for use_sigma in [false, true] {
+        for seed in 0..20 {
+            let instrument = Instrument { electrons: 3e3, ..Instrument::default() };
+            let m = measure(&truth, &instrument, &Scan::InPlane { step_deg: 5.0 }, seed);
+            let got = solved(&m, &FitOptions { use_sigma, ..options("lambert+phong") });
+            let held = |i: Option<(f64, f64)>, truth: f64| i.is_none_or(|(low, high)| (low..=high).contains(&truth));
+            let weights = &record(&got).interval_95[1].weight;
+            let sure = weights.iter().zip([0.75, 0.7, 0.6]).filter(|(i, truth)| !held(**i, *truth)).count();
+            assert!(sure <= 1, "seed {seed} {use_sigma}: {weights:?}");
+            assert!(
+                undetermined(&got).iter().any(|name| name == "phong.exponent"),
+                "seed {seed}: {:?}",
+                undetermined(&got)
+            );
+        }
+    }
+}

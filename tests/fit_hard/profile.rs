@@ -132,10 +132,14 @@ fn on_a_precise_table_the_profile_is_the_parabola() {
 #[test]
 fn a_lower_valley_that_a_profile_meets_is_the_fit() {
     let truth = lobes(0.1, &[(0.05, 5.0), (0.05, 60.0)]);
-    for (seed, electrons, step_deg) in [(21, 900.0, 15.0), (25, 900.0, 15.0)] {
-        let m = noisy(&truth, electrons, step_deg, seed);
-        let o = FitOptions { loss: Loss::CubeRoot, ..options("lambert+phong+phong") };
+    // As low as from the profiles of 600 such fits, of which three met a lower valley.
+    let cases =
+        [(116, 300.0, Loss::Log, 2.3195), (138, 300.0, Loss::Log, 2.2438), (116, 900.0, Loss::CubeRoot, 17.841)];
+    for (seed, electrons, loss, least) in cases {
+        let m = noisy(&truth, electrons, 15.0, seed);
+        let o = FitOptions { loss, ..options("lambert+phong+phong") };
         let got = solved(&m, &o);
+        assert!(record(&got).cost < least, "seed {seed}: {}", record(&got).cost);
         let names = ["lambert.weight", "phong[0].weight", "phong[1].weight", "phong[0].exponent", "phong[1].exponent"];
         for (name, interval) in names.iter().zip(intervals(&got)) {
             let Some((low, high)) = interval else { continue };

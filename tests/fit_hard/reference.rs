@@ -193,15 +193,17 @@ impl Reference {
             self.values.iter().map(|v| self.leverage(p, v, robust, &inverse)).collect();
         let (squares, expected) =
             rows.iter().fold((0.0, 0.0), |sum, (pull, _, m, rest)| (sum.0 + pull * pull, sum.1 + m * rest));
-        let q = squares / expected;
+        let (q, freedom) = (squares / expected, rows.iter().map(|row| row.3).sum::<f64>());
         let half_width = |j: usize| {
-            let (mut variance, mut mean, mut scatter) = (0.0, 0.0, 0.0);
+            let (mut variance, mut mean, mut scatter, mut filled) = (0.0, 0.0, 0.0, 0.0);
             for (pull, moved, m, rest) in &rows {
                 let far = moved[j] * moved[j];
                 variance += far * (pull * pull + 0.01 * q * m) / (rest + 0.01);
                 mean += far * q * m;
-                scatter += (far * q * m * rest / (rest + 0.01)).powi(2);
+                scatter += (far * q * m * rest / (rest + 0.01)).powi(2) / (rest + 0.01);
+                filled += far * q * m * 0.01 / (rest + 0.01);
             }
+            scatter += filled * filled / freedom;
             let freedom = (mean * mean / scatter).min((self.values.len() - p.len()) as f64);
             student_quantile(0.975, freedom) * variance.sqrt()
         };

@@ -13,7 +13,7 @@ use crate::brdf::{
     ResidualRecord, SearchRecord, SubsetRecord,
 };
 use crate::measurement::Measurement;
-use names::{ended, lobe_name, without_error};
+use names::{ended, lobe_name, weights, without_error};
 use warnings::{End, Ended, STRUCTURED};
 
 /// All that a record is made of: one part for all channels, or one a channel.
@@ -36,6 +36,10 @@ struct Row {
     bootstrap: LobeRecord<Option<f64>>,
     /// Where a shape ended at an end of its range.
     at_end: Shapes<Option<Ended>>,
+    /// Channels in which its weight's error is that of other samples' noise.
+    by_others: Vec<bool>,
+    /// Channels in which its weight ended at an end of the range that was asked for.
+    limited: Vec<bool>,
 }
 
 /// Shape parameters of a lobe by name.
@@ -51,6 +55,7 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
     let mut record = facts.numbers();
     let structured = record.residual.as_ref().is_some_and(|r| r.structured_share > STRUCTURED);
     let (mut redrawn, mut at_end) = (Vec::new(), Vec::new());
+    let (mut by_others, mut limited) = (Vec::new(), Vec::new());
     let mut sorted: Vec<Option<Row>> = rows.drain(..).map(Some).collect();
     for row in order.iter().filter_map(|&l| sorted[l].take()) {
         material.lobes.push(row.term);
@@ -61,6 +66,8 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
         }
         redrawn.push(row.bootstrap);
         at_end.push(row.at_end);
+        by_others.push(row.by_others);
+        limited.push(row.limited);
     }
     record.bootstrap = facts
         .options
@@ -73,6 +80,7 @@ pub(super) fn material(facts: &Facts<'_>) -> Material {
     record.correlation = facts.correlation(&order);
     record.energy = energy::energy(&material, facts.options.conserve_energy);
     record.warnings = facts.warnings(&material, &record, &at_end);
+    record.warnings.extend(warnings::of_weights(&weights(&material, &by_others), &weights(&material, &limited)));
     material.fit = Some(record);
     material
 }
@@ -189,13 +197,19 @@ impl Facts<'_> {
             let (part, i, unit) = at(c);
             part.bootstrap.as_ref().map(|b| b[i] * unit)
         };
+        let by_others = |c: usize| {
+            let (part, i, _) = at(c);
+            part.uncertainty.by_others.contains(&i)
+        };
         let mut row = Row {
             term: LobeTerm { kind, weight: channels.clone().map(weight).collect(), shape: None },
             error: LobeRecord { weight: channels.clone().map(error).collect(), shape: Vec::new() },
             interval: LobeRecord { weight: channels.clone().map(interval).collect(), shape: Vec::new() },
             model_error: LobeRecord { weight: channels.clone().map(model_error).collect(), shape: Vec::new() },
-            bootstrap: LobeRecord { weight: channels.map(redrawn).collect(), shape: Vec::new() },
+            bootstrap: LobeRecord { weight: channels.clone().map(redrawn).collect(), shape: Vec::new() },
             at_end: Vec::new(),
+            by_others: channels.clone().map(by_others).collect(),
+            limited: channels.clone().map(|c| self.is_limited(c, l)).collect(),
         };
         let dark = row.term.weight.iter().all(|w| *w == 0.0);
         let mut shape = Vec::new();
@@ -216,6 +230,20 @@ impl Facts<'_> {
         row
     }
 
+    fn has_limited(&self) -> bool {
+        let lobes = 0..self.model.lobes().len();
+        lobes.into_iter().any(|l| (0..self.measurement.channels.len()).any(|c| self.is_limited(c, l)))
+    }
+
+    /// Whether a weight ended at an end of a range that was asked for; that none is negative goes without saying.
+    fn is_limited(&self, channel: usize, lobe: usize) -> bool {
+        let (part, c) = self.of_channel(channel);
+        let (low, high) = self.ranges.weights[channel][lobe];
+        let x = part.solution.weights[c][lobe] * part.scale;
+        let near = |end: f64| end.is_finite() && (x - end).abs() <= 1e-12 * end.abs();
+        low < high && part.counts[c] > 0 && (low != 0.0 && near(low) || near(high))
+    }
+
     fn status(&self) -> &'static str {
         let at_bound = |p: &Part| {
             let t = &p.solution.t;
@@ -229,7 +257,7 @@ impl Facts<'_> {
             "budget"
         } else if self.parts.iter().any(|p| matches!(p.stop, Stop::MaxIterations)) {
             "max-iterations"
-        } else if self.parts.iter().any(at_bound) {
+        } else if self.parts.iter().any(at_bound) || self.has_limited() {
             "at-bound"
         } else {
             "converged"
@@ -302,7 +330,10 @@ impl Part {
         // An error wider than the whole range that is searched means that the data leave the shape open.
         let error = self.uncertainty.errors[place].filter(|e| self.lit(l) && *e < high - low);
         let known = error.is_some() || self.at_end[i];
-        let interval = self.intervals[place].filter(|_| known).map(|(low, high)| (low.exp(), high.exp()));
+        // An end of the range as it was asked for, not by way of its logarithm.
+        let lower = |t: f64| if t <= low { ranges[i].0 } else { t.exp() };
+        let upper = |t: f64| if t >= high { ranges[i].1 } else { t.exp() };
+        let interval = self.intervals[place].filter(|_| known).map(|(a, b)| (lower(a), upper(b)));
         let model_error = error.map(|_| self.uncertainty.structured[place] * value);
         let bootstrap = error.and(self.bootstrap.as_ref()).map(|b| b[place] * value);
         let interval = finite(interval);

@@ -2,7 +2,7 @@
 
 use super::Shapes;
 use super::warnings::Ended;
-use crate::brdf::{FitRecord, LobeKind, LobeRecord, Material, PerChannel};
+use crate::brdf::{LobeKind, LobeRecord, Material, PerChannel};
 
 /// What lobe `l` of these kinds is called: `phong`, `phong[1]` for the second of the kind.
 pub(super) fn lobe_name(kinds: &[LobeKind], l: usize) -> String {
@@ -25,22 +25,14 @@ pub(super) fn without_error(material: &Material, errors: &[LobeRecord<Option<f64
     names
 }
 
-/// Names of the weights whose interval is several times as wide as their standard error alone would make it.
-pub(super) fn understated(material: &Material, record: &FitRecord) -> Vec<String> {
-    let wide = |error: Option<f64>, interval: Option<(f64, f64)>| {
-        error.zip(interval).is_some_and(|(error, (low, high))| high - low > WIDE * error)
+/// Names of the weights that are marked, `[lobe][channel]`.
+pub(super) fn weights(material: &Material, marked: &[Vec<bool>]) -> Vec<String> {
+    let of_lobe = |(l, marked): (usize, &Vec<bool>)| {
+        let own = marked.iter().zip(&material.channels).filter(|(marked, _)| **marked);
+        own.map(|(_, c)| format!("{}.weight[{c}]", material.lobe_name(l))).collect::<Vec<_>>()
     };
-    let rows = record.standard_error.iter().zip(&record.interval_95).enumerate();
-    let named = rows.flat_map(|(l, (error, interval))| {
-        let each = error.weight.iter().zip(&interval.weight).zip(&material.channels);
-        let wide = each.filter(|((e, i), _)| wide(**e, **i));
-        wide.map(move |(_, c)| format!("{}.weight[{c}]", material.lobe_name(l))).collect::<Vec<_>>()
-    });
-    named.collect()
+    marked.iter().enumerate().flat_map(of_lobe).collect()
 }
-
-/// Widths of an interval over its standard error from which the latter is no guide; 3.9 is usual.
-const WIDE: f64 = 12.0;
 
 /// The shapes that ended at an end of their range, by name.
 pub(super) fn ended(material: &Material, at_end: &[Shapes<Option<Ended>>]) -> Vec<(String, Ended)> {

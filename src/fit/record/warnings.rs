@@ -1,7 +1,6 @@
 //! What a fit says of itself in words.
 
 use super::Facts;
-use super::names::understated;
 use crate::brdf::{FitRecord, Material};
 use crate::fit::loss::Loss;
 use crate::fit::options::WeightMode;
@@ -91,13 +90,6 @@ impl Facts<'_> {
                 100.0 * subset.rmse_excess_95
             ));
         }
-        let lone = understated(material, record);
-        if !lone.is_empty() {
-            list.push(format!(
-                "so few samples decide {} that their residuals, and the standard error made of them, say little of the noise: go by the interval",
-                lone.join(", ")
-            ));
-        }
         list.extend(self.structure_warning(record));
         list.extend(self.noise_warnings(record));
         let capped: Vec<&str> = self.capped().map(|c| self.measurement.channels[c].as_str()).collect();
@@ -126,18 +118,21 @@ impl Facts<'_> {
         let structured = record.residual.as_ref().is_some_and(|r| r.structured_share > STRUCTURED);
         // Of other losses the stated noise is a guess where it is not small beside the value.
         let linear = matches!(self.options.loss, Loss::L2 | Loss::CosineL2);
-        let off = self.parts.iter().filter_map(|p| p.offset).fold(0.0, f64::max);
+        let off = self.parts.iter().filter_map(|p| p.uncertainty.offset).fold(0.0, f64::max);
         if off > 0.0 && !structured {
-            let cause = if self.parts[0].weighting == "sigma" {
-                "weights that follow the noise pull"
+            let (cause, cover) = if linear {
+                (
+                    "weights that follow the noise pull",
+                    "the standard errors do not cover that, the intervals allow for it",
+                )
             } else {
-                "this loss pulls"
+                ("this loss pulls", "neither standard errors nor intervals cover that")
             };
             let misfit = record.residual.as_ref().is_some_and(|r| r.model_rmse > 0.0);
             let or = if misfit { " (or the model's own error, weighed differently, does)" } else { "" };
             list.push(format!(
-                "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away{or}, and \
-                 neither standard errors nor intervals cover that; `--loss cosine-l2` without `--use-sigma` follows the mean"
+                "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away{or}; \
+                 {cover}; `--loss cosine-l2` without `--use-sigma` follows the mean"
             ));
         }
         if let Some(residual) = record
@@ -185,6 +180,26 @@ impl Facts<'_> {
             residual.noise_rmse,
         ))
     }
+}
+
+/// Weights of which there is something to say, by name: those whose error is that of other samples' noise, and those at an end of a range that
+/// was asked for.
+pub(super) fn of_weights(by_others: &[String], limited: &[String]) -> Vec<String> {
+    let mut list = Vec::new();
+    if !by_others.is_empty() {
+        list.push(format!(
+            "so few samples decide {} that their residuals say nothing of the noise: that of the others counts in its place",
+            by_others.join(", ")
+        ));
+    }
+    if !limited.is_empty() {
+        list.push(format!(
+            "{} ended at an end of the range that was asked for: the data ask for a value beyond it, and the standard error is of a weight that \
+             is free",
+            limited.join(", ")
+        ));
+    }
+    list
 }
 
 /// The robust scale and the parameters have not met: ln(scale asked for / scale used) is `left`.
