@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::stated_errors;
+use super::covariance::{spread_into, stated_errors};
 use super::passes::Scratch;
 use super::reduced::{Problem, Solution};
 use super::samples::Block;
@@ -106,13 +106,8 @@ impl<'a> Leveraged<'a> {
     fn add(&mut self, problem: &Problem<'_>, at: &Solution, channel: usize, sums: &Sums, noise: Noise) {
         let (strength, place) = (problem.strength(&at.weights[channel]), problem.place(at.weights.len(), channel));
         let q = noise.variance();
-        for (i, &a) in place.iter().enumerate() {
-            for (j, &b) in place.iter().enumerate() {
-                let (both, at) = (strength[i] * strength[j], (i.max(j), i.min(j)));
-                self.spread[(a, b)] += both * (sums.squares[at] + q * sums.filled[at]);
-                self.lone[(a, b)] += both * q * sums.lone[at];
-            }
-        }
+        spread_into(&mut self.spread, &(&sums.squares + &sums.filled * q), &strength, &place);
+        spread_into(&mut self.lone, &(&sums.lone * q), &strength, &place);
         for (total, own) in self.influence.iter_mut().zip(&sums.influence) {
             total.variance += q * own.variance;
             total.filled += q * own.filled;

@@ -4,6 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::covariance::spread_into;
 use super::loss::Robust;
 use super::passes::{Projected, Scratch};
 use crate::numeric::simd::vectorised;
@@ -41,12 +42,8 @@ impl Outliers {
     /// Adds those of one channel, whose columns count `strength` times and stand at `place` among the parameters.
     pub fn add_channel(&mut self, channel: &Self, strength: &[f64], place: &[usize]) {
         self.count += channel.count;
-        for (i, &a) in place.iter().enumerate() {
-            self.pull[a] += strength[i] * channel.pull[i];
-            for (j, &b) in place.iter().enumerate() {
-                self.squares[(a, b)] += strength[i] * strength[j] * channel.squares[(i.max(j), i.min(j))];
-            }
-        }
+        place.iter().enumerate().for_each(|(i, &a)| self.pull[a] += strength[i] * channel.pull[i]);
+        spread_into(&mut self.squares, &channel.squares, strength, place);
     }
 
     /// By how much the pulls add up to more than if their signs were random, squared: 1 on average where they are.

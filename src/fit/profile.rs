@@ -68,7 +68,7 @@ impl<'a> Trail<'a> {
         let shape = |(i, t): (usize, &f64)| place(weights + i, *t, held.bounds[i]);
         let t: Vec<f64> = self.at.t.iter().enumerate().map(shape).collect();
         let of = |(c, x): (usize, &DVector<f64>)| {
-            held.within(c, DVector::from_fn(lobes, |l, _| place(c * lobes + l, x[l], held.ranges[c][l])))
+            held.within(c, &DVector::from_fn(lobes, |l, _| place(c * lobes + l, x[l], held.ranges[c][l])))
         };
         let weights = self.at.weights.iter().enumerate().map(of).collect();
         Solution { lobes: held.shaped(&t), t, weights, cost: f64::NAN }

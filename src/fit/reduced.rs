@@ -124,7 +124,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Weights of a channel as they may be: in their ranges, and each less by its part of what their sum is above the cap.
-    pub fn within(&self, channel: usize, x: DVector<f64>) -> DVector<f64> {
+    pub fn within(&self, channel: usize, x: &DVector<f64>) -> DVector<f64> {
         let ranges = &self.ranges[channel];
         let x = x.map_with_location(|l, _, x| x.clamp(ranges[l].0, ranges[l].1));
         let slack = |l: usize| x[l] - ranges[l].0;

@@ -51,7 +51,7 @@ impl<'a> Streamed<'a> {
         }
         let lobes = self.problem.shaped(t);
         let start = last.map_or_else(|| self.first_weights(), |s| s.weights);
-        let solution = self.descend(t, lobes, start);
+        let solution = self.descend(t, lobes, &start);
         *self.last.borrow_mut() = Some(solution.clone());
         solution
     }
@@ -61,10 +61,10 @@ impl<'a> Streamed<'a> {
         vec![DVector::from_element(self.problem.kinds.len(), FIRST_WEIGHT); self.problem.ranges.len()]
     }
 
-    fn descend(&self, t: &[f64], lobes: Vec<ShapedLobe>, start: Vec<DVector<f64>>) -> Solution {
+    fn descend(&self, t: &[f64], lobes: Vec<ShapedLobe>, start: &[DVector<f64>]) -> Solution {
         let problem = self.problem;
         let evaluate = |x: &[DVector<f64>]| passes::sums(problem.samples, &lobes, x, problem.saturation, Want::Weights);
-        let mut x: Vec<_> = start.into_iter().enumerate().map(|(c, x)| problem.within(c, x)).collect();
+        let mut x: Vec<_> = start.iter().enumerate().map(|(c, x)| problem.within(c, x)).collect();
         let mut at = evaluate(&x);
         let mut damping = vec![0.0f64; x.len()];
         for _ in 0..INNER_STEPS {

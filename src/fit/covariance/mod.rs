@@ -1,0 +1,135 @@
+//! How sure the parameters are: the sandwich covariance A⁻¹ B A⁻¹, shared error components, what the data leave open, and what the
+//! residuals of neighbours say of the model's own error. One pass over the samples.
+
+mod sandwich;
+mod sums;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::leverage::Leveraged;
+use super::loss::Robust;
+use super::offset;
+use super::part::SMALL;
+use super::passes::Moments;
+use super::reduced::{Problem, Solution};
+use super::structure::Neighbours;
+use crate::numeric::stats::student_quantile;
+use sandwich::Sandwich;
+use sums::Totals;
+pub(super) use sums::{spread_into, stated_errors};
+
+/// A 95 % interval.
+pub type Interval = (f64, f64);
+
+/// Uncertainty of all parameters: the weights channel by channel, lobe by lobe, then every ln(shape); in the fit's scale.
+#[derive(Debug, Clone)]
+pub(super) struct Uncertainty {
+    /// Σ w r² from true residuals (robust: Σ w s² ρ).
+    pub cost: f64,
+    /// Whether a channel has a sample where the lobes with a shape are 0 whatever it is.
+    pub dark: Vec<bool>,
+    /// Standard error of each parameter; `None` where the data don't determine it.
+    pub errors: Vec<Option<f64>>,
+    /// Covariance, rows and columns of undetermined parameters meaningless.
+    pub covariance: DMatrix<f64>,
+    /// Covariance by the residuals alone, whatever σ is stated: how far another drawing of the samples would move the parameters.
+    pub drawn: DMatrix<f64>,
+    /// A.
+    pub normal: DMatrix<f64>,
+    /// The inverse of A, pseudo where singular: the cost rises by δ²/Aⱼⱼ⁻¹ when parameter j alone is held off by δ.
+    pub bread: DMatrix<f64>,
+    /// Standard errors if the residuals of neighbours are taken as one error, not many: what model error does to the parameters.
+    pub structured: Vec<f64>,
+    /// How many samples are worth one independent one, at least 1: by how much the parameters scatter more than if residuals were independent
+    /// (Kish's design effect).
+    pub design_effect: f64,
+    /// Products of neighbours' residuals.
+    pub neighbours: Neighbours,
+    /// Σ w σ_r² over samples and channels with a stated σ, and how many there are.
+    pub stated: (f64, usize),
+    /// How clearly the fit is off the data's mean, in standard deviations, where it is.
+    pub offset: Option<f64>,
+    /// Number of gross outliers, where they lean to one side.
+    pub leaning: Option<usize>,
+    /// Parameters whose error is for the most part that of samples which say nothing of their own noise.
+    pub by_others: Vec<usize>,
+    /// Half width of each parameter's 95 % interval over its standard error: Student's t, and what leverage asks for.
+    pub reach: Vec<f64>,
+}
+
+/// Standard errors at a solution. `moments` are the sums of A where they are known.
+pub(super) fn uncertainty(
+    problem: &Problem<'_>,
+    at: &Solution,
+    moments: Option<&Moments>,
+    robust: Option<Robust>,
+) -> Uncertainty {
+    let n = problem.samples.residuals();
+    let pinned = pinned(problem, at.weights.len());
+    let freedom = n as f64 - pinned.iter().filter(|p| !**p).count() as f64;
+    let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
+    let totals = Totals::gathered(problem, at, moments, robust);
+    let sandwich = Sandwich::new(&totals.normal, &pinned, &limited(problem, at, &pinned));
+    let shared: Vec<_> = totals.common.iter().cloned().chain([totals.outliers.shared(&sandwich.bread)]).collect();
+    let mut spread = &totals.known + &totals.by_residuals * inflation;
+    let told_by_residuals = problem.saturation.is_some() || totals.stated.1 < n;
+    let leveraged =
+        (n <= SMALL && freedom > 0.0 && told_by_residuals).then(|| Leveraged::new(problem, at, &sandwich.bread));
+    if let Some(leveraged) = &leveraged {
+        spread += &leveraged.lone;
+    }
+    let covariance = sandwich.covariance(&spread, &shared);
+    let leaning = totals.outliers.lean(&sandwich.bread).then_some(totals.outliers.count);
+    let mut errors = sandwich.errors(&covariance);
+    errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
+    let (mut reach, by_others) = match leveraged {
+        Some(leveraged) => {
+            let certain = sandwich.covariance(&totals.known, &shared).diagonal();
+            (leveraged.reach(&certain, &covariance.diagonal(), freedom), leveraged.by_others(&certain))
+        }
+        None => (vec![student_quantile(0.975, freedom.max(1.0)); pinned.len()], Vec::new()),
+    };
+    let offset = offset::offset(problem, at);
+    if let Some(offset) = &offset {
+        let moved = &sandwich.bread * &offset.pull;
+        let wider = |i: usize| (1.0 + moved[i] * moved[i] / covariance[(i, i)]).sqrt();
+        reach.iter_mut().enumerate().for_each(|(i, r)| *r *= if moved[i] == 0.0 { 1.0 } else { wider(i) });
+    }
+    let (clusters, count) = (totals.clusters.0, totals.clusters.1 as f64);
+    let grouped = sandwich.covariance(&(clusters * (count / (count - 1.0).max(1.0))), &[]);
+    let drawn = sandwich.covariance(&totals.drawn, &[]);
+    let design_effect = (&totals.normal * &grouped).trace() / (&totals.normal * &drawn).trace();
+    Uncertainty {
+        cost: totals.cost,
+        dark: totals.dark,
+        design_effect: if design_effect > 1.0 { design_effect } else { 1.0 },
+        errors,
+        structured: grouped.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
+        covariance,
+        drawn,
+        normal: totals.normal,
+        bread: sandwich.bread,
+        neighbours: totals.neighbours,
+        stated: totals.stated,
+        offset: offset.map(|offset| offset.score),
+        leaning,
+        by_others,
+        reach,
+    }
+}
+
+/// The weights of each channel that its energy limit ties together: they can move, but not their sum. A weight alone has nothing to be tied
+/// to: it stands at the end of its range, and keeps its error as one at 0 does.
+fn limited(problem: &Problem<'_>, at: &Solution, pinned: &[bool]) -> Vec<Vec<usize>> {
+    let of = |(c, x): (usize, &DVector<f64>)| {
+        let own: Vec<usize> = (c * x.len()..(c + 1) * x.len()).filter(|&i| !pinned[i]).collect();
+        (problem.feasible(c).free_at(x).1 && own.len() > 1).then_some(own)
+    };
+    at.weights.iter().enumerate().filter_map(of).collect()
+}
+
+/// Which parameters are held at a value.
+pub(super) fn pinned(problem: &Problem<'_>, channels: usize) -> Vec<bool> {
+    let ranges = problem.ranges[..channels].iter().flatten().chain(&problem.bounds);
+    ranges.map(|(low, high)| low == high).collect()
+}

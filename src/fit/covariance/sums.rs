@@ -1,0 +1,337 @@
+//! The sums that the covariance is made of, from one pass over the samples.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::super::folded::{OnLines, Products, Residuals};
+use super::super::loss::{Datum, Robust};
+use super::super::merl_lines::{Line, MerlLines};
+use super::super::outliers::{self, Outliers};
+use super::super::passes::{Moments, Projected, Scratch};
+use super::super::reduced::{Problem, Solution};
+use super::super::samples::Block;
+use super::super::structure::Neighbours;
+use super::super::tally::Tallied;
+use crate::numeric::simd::{Kernel, Simd, dot_vectorised, vectorised};
+
+/// The sums over all samples, by all parameters.
+pub(super) struct Totals {
+    pub cost: f64,
+    pub dark: Vec<bool>,
+    /// A.
+    pub normal: DMatrix<f64>,
+    /// B of the values with a stated σ.
+    pub known: DMatrix<f64>,
+    /// B of the values without one, before the factor N/(N − p).
+    pub by_residuals: DMatrix<f64>,
+    /// B of all values by their residuals.
+    pub drawn: DMatrix<f64>,
+    /// Σ g gᵀ over clusters of neighbours, and how many there are.
+    pub clusters: (DMatrix<f64>, usize),
+    pub common: Vec<DVector<f64>>,
+    pub outliers: Outliers,
+    pub neighbours: Neighbours,
+    pub stated: (f64, usize),
+}
+
+impl Totals {
+    fn new(problem: &Problem<'_>, channels: usize) -> Self {
+        let parameters = channels * problem.kinds.len() + problem.layout.len();
+        let zero = DMatrix::zeros(parameters, parameters);
+        Self {
+            cost: 0.0,
+            dark: vec![false; channels],
+            normal: zero.clone(),
+            known: zero.clone(),
+            by_residuals: zero.clone(),
+            drawn: zero.clone(),
+            clusters: (zero, 0),
+            common: vec![DVector::zeros(parameters); problem.samples.measurement.common.len()],
+            outliers: Outliers::new(parameters),
+            neighbours: Neighbours::default(),
+            stated: (0.0, 0),
+        }
+    }
+
+    /// All of them. `moments` are the sums of A where they are known; `robust` says from which residual one is a gross outlier.
+    pub fn gathered(problem: &Problem<'_>, at: &Solution, moments: Option<&Moments>, robust: Option<Robust>) -> Self {
+        let start = || Piece::new(problem, at);
+        let gross = outliers::gross(robust, problem.saturation.map_or(1.0, |(_, s)| s));
+        let add = |piece: &mut Piece, block: &Block| piece.add(problem, at, block, moments.is_none(), gross);
+        let add_lines =
+            |piece: &mut Piece, lines: &MerlLines, block: &[Line]| piece.add_lines(problem, at, lines, block);
+        let folded = moments.and_then(|_| problem.samples.map_lines(start, add_lines));
+        let mut pieces = folded.unwrap_or_else(|| problem.samples.map_pieces(start, add));
+        let mut totals = Self::new(problem, at.weights.len());
+        for piece in &mut pieces {
+            piece.close();
+            totals.clusters.0 += &piece.clusters;
+            totals.clusters.1 += piece.count;
+            for (c, sums) in piece.channels.iter().enumerate() {
+                totals.add(problem, at, c, sums);
+            }
+        }
+        for (c, x) in at.weights.iter().enumerate() {
+            let (strength, place) = (problem.strength(x), problem.place(at.weights.len(), c));
+            if let Some(moments) = moments {
+                spread_into(&mut totals.normal, moments.gram(c), &strength, &place);
+            }
+        }
+        totals
+    }
+
+    fn add(&mut self, problem: &Problem<'_>, at: &Solution, channel: usize, sums: &ChannelSums) {
+        let has_sigma = problem.samples.measurement.sigma.is_some() && problem.saturation.is_none();
+        let strength = problem.strength(&at.weights[channel]);
+        let place = problem.place(at.weights.len(), channel);
+        let squares = if has_sigma { &sums.squares } else { &sums.spread };
+        spread_into(&mut self.normal, &sums.normal, &strength, &place);
+        spread_into(&mut self.drawn, squares, &strength, &place);
+        spread_into(&mut self.known, &sums.known, &strength, &place);
+        spread_into(&mut self.by_residuals, &sums.spread, &strength, &place);
+        for (total, part) in self.common.iter_mut().zip(&sums.common) {
+            place.iter().enumerate().for_each(|(i, &a)| total[a] += strength[i] * part[i]);
+        }
+        self.outliers.add_channel(&sums.outliers, &strength, &place);
+        self.cost += sums.cost;
+        self.stated = (self.stated.0 + sums.stated.0, self.stated.1 + sums.stated.1);
+        self.neighbours.add(&sums.neighbours);
+        self.dark[channel] |= sums.dark;
+    }
+}
+
+/// Adds a channel's matrix of bare columns, its lower triangle, to one of all parameters: columns count `strength` times and stand at `place`.
+pub(in crate::fit) fn spread_into(to: &mut DMatrix<f64>, bare: &DMatrix<f64>, strength: &[f64], place: &[usize]) {
+    for (i, &a) in place.iter().enumerate() {
+        for (j, &b) in place.iter().enumerate() {
+            to[(a, b)] += strength[i] * strength[j] * bare[(i.max(j), i.min(j))];
+        }
+    }
+}
+
+/// Sums of one channel over [its lobes' weights, all shapes].
+#[derive(Clone)]
+struct ChannelSums {
+    cost: f64,
+    normal: DMatrix<f64>,
+    /// B of the values without a stated σ, before the factor N/(N − p).
+    spread: DMatrix<f64>,
+    /// B of the values with one.
+    known: DMatrix<f64>,
+    /// B of all values by their residuals; the same as `spread` where no σ is stated.
+    squares: DMatrix<f64>,
+    common: Vec<DVector<f64>>,
+    outliers: Outliers,
+    /// Whether a sample lies where the lobes with a shape are 0 whatever it is.
+    dark: bool,
+    stated: (f64, usize),
+    neighbours: Neighbours,
+    /// What lines of a table have added to cost, darkness and neighbours, and to the spread.
+    on_lines: OnLines,
+    tallied: Tallied,
+}
+
+/// What a piece of the samples adds.
+struct Piece {
+    channels: Vec<ChannelSums>,
+    /// Σ over clusters of neighbours of the outer product of their pull on the parameters.
+    clusters: DMatrix<f64>,
+    count: usize,
+    residuals: Residuals,
+}
+
+impl Piece {
+    fn new(problem: &Problem<'_>, at: &Solution) -> Self {
+        let (channels, k) = (at.weights.len(), problem.kinds.len() + problem.layout.len());
+        let parameters = channels * problem.kinds.len() + problem.layout.len();
+        let sums = ChannelSums {
+            cost: 0.0,
+            normal: DMatrix::zeros(k, k),
+            spread: DMatrix::zeros(k, k),
+            known: DMatrix::zeros(k, k),
+            squares: DMatrix::zeros(k, k),
+            common: vec![DVector::zeros(k); problem.samples.measurement.common.len()],
+            outliers: Outliers::new(k),
+            dark: false,
+            stated: (0.0, 0),
+            neighbours: Neighbours::default(),
+            on_lines: OnLines::default(),
+            tallied: Tallied::new(k),
+        };
+        let clusters = DMatrix::zeros(parameters, parameters);
+        Self { channels: vec![sums; channels], clusters, count: 0, residuals: Residuals::default() }
+    }
+
+    /// Adds all sums over one block; `bread` says whether A is among them, `gross` from which residual one is an outlier.
+    fn add(&mut self, problem: &Problem<'_>, at: &Solution, block: &Block, bread: bool, gross: f64) {
+        let channels = at.weights.len();
+        self.residuals.scratch.basis(&block.x, &at.lobes);
+        let clusters: Vec<std::ops::Range<usize>> = problem.samples.clusters(block);
+        let mut scores = vec![DVector::<f64>::zeros(self.clusters.nrows()); clusters.len()];
+        for (c, x) in at.weights.iter().enumerate() {
+            let (scratch, sums) = (&mut self.residuals.scratch, &mut self.channels[c]);
+            sums.cost += scratch.residuals(problem.samples, block, c, x, problem.saturation);
+            let (w, pairs) = (block.weight(c), &block.pairs);
+            sums.neighbours.add(&Neighbours::of(&scratch.r, &scratch.trust, w, pairs));
+            sums.dark |= vectorised(Dark(&block.x, w)) > 0.0;
+            let gradient = sums.add(problem, block, c, scratch, bread);
+            sums.outliers.add(scratch, gross);
+            let (strength, place) = (problem.strength(x), problem.place(channels, c));
+            if clusters.len() == 1 {
+                place.iter().enumerate().for_each(|(i, p)| scores[0][*p] += strength[i] * gradient[i]);
+                continue;
+            }
+            for (score, cluster) in scores.iter_mut().zip(&clusters) {
+                for (i, column) in scratch.columns.iter().enumerate() {
+                    let sum = dot_vectorised(&scratch.pull[cluster.clone()], &column[cluster.clone()]);
+                    score[place[i]] += strength[i] * sum;
+                }
+            }
+        }
+        scores.iter().for_each(|s| self.clusters.ger(1.0, s, s, 1.0));
+        self.count += clusters.len();
+    }
+
+    /// Adds all sums over a block of a table's lines, A aside; its samples are one cluster.
+    fn add_lines(&mut self, problem: &Problem<'_>, at: &Solution, lines: &MerlLines, block: &[Line]) {
+        for line in block {
+            self.residuals.set(lines, line, problem.samples, &at.lobes);
+            for (sums, (c, x)) in self.channels.iter_mut().zip(at.weights.iter().enumerate()) {
+                self.residuals.fill(problem.samples, c, x, Products::Scatter, &mut sums.on_lines);
+                sums.tallied.add(&self.residuals.scratch);
+            }
+        }
+        if block.is_empty() {
+            return;
+        }
+        let mut score = DVector::<f64>::zeros(self.clusters.nrows());
+        let mut gradient = DVector::zeros(problem.kinds.len() + problem.layout.len());
+        for (sums, (c, x)) in self.channels.iter_mut().zip(at.weights.iter().enumerate()) {
+            sums.tallied.take_gradient(&mut gradient);
+            let (strength, place) = (problem.strength(x), problem.place(at.weights.len(), c));
+            place.iter().enumerate().for_each(|(i, p)| score[*p] += strength[i] * gradient[i]);
+        }
+        self.clusters.ger(1.0, &score, &score, 1.0);
+        self.count += 1;
+    }
+
+    /// Brings what lines left in lanes to the other sums.
+    fn close(&mut self) {
+        for sums in &mut self.channels {
+            let mut gradient = DVector::zeros(sums.spread.nrows());
+            sums.tallied.add_to(&mut gradient, &mut sums.spread);
+            sums.cost += sums.on_lines.cost();
+            sums.dark |= sums.on_lines.is_dark();
+            sums.neighbours.add(&sums.on_lines.neighbours.total());
+        }
+    }
+}
+
+/// Σ w where the lobes with a shape are 0.
+struct Dark<'a>(&'a [f64], &'a [f64]);
+
+impl Kernel for Dark<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _simd: S) -> f64 {
+        let ((x8, rest_x), (w8, rest_w)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
+        let mut lanes = [0.0f64; 8];
+        let dark = |x: f64, w: f64| if x == f64::NEG_INFINITY { w } else { 0.0 };
+        for (x, w) in x8.iter().zip(w8) {
+            for k in 0..8 {
+                lanes[k] += dark(x[k], w[k]);
+            }
+        }
+        lanes.iter().sum::<f64>() + rest_x.iter().zip(rest_w).map(|(x, w)| dark(*x, *w)).sum::<f64>()
+    }
+}
+
+impl ChannelSums {
+    /// Adds A, B and the g_k over a block, of the bare columns, and returns Σ pull·col. v is σ_r² where σ is known, else r²; under a robust loss
+    /// always the latter, for a stated σ says nothing of outliers.
+    fn add(
+        &mut self,
+        problem: &Problem<'_>,
+        block: &Block,
+        channel: usize,
+        scratch: &mut Scratch,
+        bread: bool,
+    ) -> DVector<f64> {
+        let measurement = problem.samples.measurement;
+        let own = problem.samples.channels[channel];
+        let (k, w) = (scratch.columns.len(), block.weight(channel));
+        let mut gradient = DVector::zeros(k);
+        if bread {
+            scratch.curvature(block, channel);
+            if let Some((kind, s)) = problem.saturation {
+                // How the pull itself grows with the residual.
+                let growth = |i: usize| w[i] * scratch.slope[i].powi(2) * kind.rho((scratch.r[i] / s).powi(2)).2;
+                scratch.weight = (0..w.len()).map(growth).collect();
+            }
+            scratch.tally(k, &mut gradient, &mut self.normal);
+            gradient.fill(0.0);
+        }
+        let data_slopes = data_slopes(problem, block, channel, &scratch.f);
+        scratch.squared_pull();
+        let known = stated_errors(problem, block, channel, &scratch.f);
+        if !known.is_empty() {
+            for (s, w) in known.iter().zip(w) {
+                self.stated.0 += s.map_or(0.0, |s| w * s * s);
+                self.stated.1 += usize::from(s.is_some());
+            }
+            if problem.saturation.is_none() {
+                scratch.tally(k, &mut gradient, &mut self.squares);
+                let mut rest = std::mem::take(&mut scratch.weight);
+                let spread = |(i, s): (usize, &Option<f64>)| s.map_or(0.0, |s| (w[i] * scratch.slope[i] * s).powi(2));
+                scratch.weight = known.iter().enumerate().map(spread).collect();
+                scratch.tally(k, &mut gradient, &mut self.known);
+                rest.iter_mut().zip(&known).filter(|(_, s)| s.is_some()).for_each(|(v, _)| *v = 0.0);
+                scratch.weight = rest;
+                gradient.fill(0.0);
+            }
+        }
+        scratch.tally(k, &mut gradient, &mut self.spread);
+        for (component, total) in self.common.iter_mut().enumerate() {
+            let u = measurement.common_plane(component, own);
+            let trust = |i: usize| scratch.trust.get(i).copied().unwrap_or(1.0);
+            let moved = |i: usize| {
+                // The cube root's ∂r/∂y is infinite at 0.
+                let shift = data_slopes[i] * u[block.index[i] as usize];
+                if w[i] > 0.0 && shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * shift } else { 0.0 }
+            };
+            let moved: Vec<f64> = (0..block.len()).map(moved).collect();
+            vectorised(Projected { columns: &scratch.columns, on: &moved, into: total.as_mut_slice() });
+        }
+        gradient
+    }
+}
+
+/// σ_r of every value of a block that states its σ; empty where the measurement states none.
+pub(in crate::fit) fn stated_errors(
+    problem: &Problem<'_>,
+    block: &Block,
+    channel: usize,
+    f: &[f64],
+) -> Vec<Option<f64>> {
+    let samples = problem.samples;
+    let Some(sigma) = samples.measurement.sigma_plane(samples.channels[channel]) else { return Vec::new() };
+    let (slopes, w) = (data_slopes(problem, block, channel, f), block.weight(channel));
+    let of = |i: usize| {
+        let s = slopes[i].abs() * sigma[block.index[i] as usize];
+        (s.is_finite() && s > 0.0 && w[i] > 0.0).then_some(s)
+    };
+    (0..block.len()).map(of).collect()
+}
+
+/// ∂r/∂y in the fit's scale, for errors in the data's own unit; empty where the measurement states none.
+fn data_slopes(problem: &Problem<'_>, block: &Block, channel: usize, f: &[f64]) -> Vec<f64> {
+    let samples = problem.samples;
+    if samples.measurement.sigma.is_none() && samples.measurement.common.is_empty() {
+        return Vec::new();
+    }
+    let slope = |i: usize| {
+        let datum = Datum { value: block.y[channel][i], cos_i: block.cos_i[i], epsilon: samples.epsilon[channel] };
+        samples.loss.data_slope(f[i], datum) / samples.scale
+    };
+    (0..block.len()).map(slope).collect()
+}
