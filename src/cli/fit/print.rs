@@ -202,14 +202,26 @@ fn comparison(choice: &ModelChoice, record: &FitRecord, unit: &str) -> String {
         let mark = if c.model == choice.chosen { "*" } else { " " };
         let _ = writeln!(
             t,
-            "{mark} {:width$} {:4} {:10.3e} {:10.3e} {:10.1} {:10.1}",
-            c.model, c.parameters, c.rmse, c.held_out_rmse, c.aicc, c.bic
+            "{mark} {:width$} {:4} {:10.3e} {:10.3e} {:>10} {:>10}",
+            c.model,
+            c.parameters,
+            c.rmse,
+            c.held_out_rmse,
+            criterion(c.aicc),
+            criterion(c.bic)
         );
     }
-    for line in [basis(choice, record, unit), Some(format!("chosen: {}: {}", choice.chosen, choice.reason))] {
+    let open = choice.candidates.iter().any(|c| !c.aicc.is_finite());
+    let few = open.then(|| "AICc: — where the independent values are too few for so many parameters".to_owned());
+    for line in [basis(choice, record, unit), few, Some(format!("chosen: {}: {}", choice.chosen, choice.reason))] {
         line.iter().for_each(|line| t.push_str(&hanging(line)));
     }
     t
+}
+
+/// One decimal; a criterion that has no value is a dash.
+fn criterion(x: f64) -> String {
+    if x.is_finite() { format!("{x:.1}") } else { "—".into() }
 }
 
 /// What the table's rmse are of: their unit, and why the chosen model's differs from that of the fit.
@@ -219,7 +231,7 @@ fn basis(choice: &ModelChoice, record: &FitRecord, unit: &str) -> Option<String>
         (None, Some(_)) => Some("of all samples".to_owned()),
         (None, None) => None,
     };
-    let robust = record.robust.as_ref().map(|_| "with the robust scale of the richest model for all".to_owned());
+    let robust = record.robust.as_ref().map(|_| "with one robust scale for all".to_owned());
     let unit = (!unit.is_empty()).then(|| format!("in{unit}"));
     let differs = part.is_some() || robust.is_some();
     let facts: Vec<String> = [unit, part, robust].into_iter().flatten().collect();
