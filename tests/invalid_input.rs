@@ -12,7 +12,7 @@ use goniofit::numeric::random::{Purpose, RngExt, stream};
 /// A file of `data-fixtures/invalid`, and what its error must say of place, expected and found.
 type Broken = (&'static str, [&'static str; 3]);
 
-const CSV: [Broken; 34] = [
+const CSV: [Broken; 35] = [
     ("csv-text-for-number.csv", ["line 3, column r", "expected a number", "found \"bright\""]),
     ("csv-text-for-angle.csv", ["line 2, column theta_o_deg", "expected a number", "found \"ten\""]),
     ("csv-extra-column.csv", ["line 3", "expected 5 cells", "found 6"]),
@@ -20,10 +20,14 @@ const CSV: [Broken; 34] = [
     ("csv-missing-angle-column.csv", ["line 1, header", "expected a column phi_i_deg", "found \"theta_i_deg,theta_o"]),
     ("csv-misspelt-angle-column.csv", ["line 1, header", "no others", "found \"theta_o\""]),
     ("csv-semicolons.csv", ["line 1, header", "separated by commas", "found \"theta_i_deg;phi_i_deg"]),
+    ("csv-tabs.csv", ["line 1, header", "separated by commas, not tabs", "found \"theta_i_deg\\tphi_i_deg"]),
     ("csv-direction-not-finite.csv", ["line 2, column theta_o_deg", "expected a finite number", "found \"nan\""]),
     ("csv-negative-sigma.csv", ["line 2, column sigma_r", "expected a number ≥ 0", "found \"-0.01\""]),
     ("csv-sigma-of-unknown-channel.csv", ["line 1, header", "the name of a channel (r)", "found \"sigma_red\""]),
-    ("csv-sigma-missing-for-valid-value.csv", ["line 3, column sigma_r", "expected a number", "found \"\""]),
+    (
+        "csv-sigma-missing-for-valid-value.csv",
+        ["line 3, column sigma_r", "expected a number, 1 σ of the value", "found \"\""],
+    ),
     ("csv-sigma-for-one-channel-of-two.csv", ["line 1, header", "every channel (r, g) or for none", "sigma_r\""]),
     ("csv-common-without-number.csv", ["line 1, header", "expected common_<number>_<channel>", "found \"common_r\""]),
     ("csv-common-leading-zero.csv", ["line 1, header", "in plain digits (1, not 01 or +1)", "found \"common_01_r\""]),

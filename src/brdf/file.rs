@@ -119,10 +119,17 @@ pub struct ModelCandidate {
     pub rmse: f64,
     /// Its rmse on directions that it was not fitted to, cells of (θi, θo) held out in turn.
     pub held_out_rmse: f64,
-    /// Akaike's criterion, corrected for few samples, over the number of independent samples that the residuals are worth.
+    /// Akaike's criterion, corrected for few samples, over the number of independent samples that the residuals are worth; infinite where
+    /// they are too few for so many parameters, which a file says by `null`.
+    #[serde(deserialize_with = "or_infinite")]
     pub aicc: f64,
     /// Schwarz's criterion, over the same number.
     pub bic: f64,
+}
+
+/// A number; `null`, the file's form of what is not finite, is +∞.
+fn or_infinite<'de, D: serde::Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    Option::<f64>::deserialize(d).map(|number| number.unwrap_or(f64::INFINITY))
 }
 
 /// Correlations between the errors of parameters.

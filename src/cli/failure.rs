@@ -66,7 +66,10 @@ impl From<FitError> for Failure {
         match error {
             FitError::Option { .. } => Self::usage(format!("--{message}")),
             FitError::Infeasible { .. } => Self::usage(format!("--conserve-energy: {message}")),
-            FitError::Limit { .. } | FitError::LimitTwice { .. } | FitError::Overflow { .. } => Self::usage(message),
+            FitError::Limit { .. }
+            | FitError::LimitTwice { .. }
+            | FitError::Overflow { .. }
+            | FitError::Underflow { .. } => Self::usage(message),
             _ => Self::work(message),
         }
     }

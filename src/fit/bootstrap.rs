@@ -13,33 +13,62 @@ use super::samples::Samples;
 use crate::brdf::ModelSpec;
 use crate::numeric::random::{Purpose, stream};
 
+/// Drawings that are made however little time there is: fewer know a standard deviation worse than to 16 %.
+pub(super) const LEAST: u32 = 20;
+
+/// Standard deviation of every parameter, in the uncertainty's order and the fit's scale.
+#[derive(Debug, Clone)]
+pub(super) struct Redrawn {
+    pub deviation: Vec<f64>,
+    /// Data sets drawn.
+    pub replicates: u32,
+}
+
+impl std::ops::Index<usize> for Redrawn {
+    type Output = f64;
+
+    fn index(&self, parameter: usize) -> &f64 {
+        &self.deviation[parameter]
+    }
+}
+
 /// What is redrawn, where that is asked for: all samples, in one list.
 pub(super) fn listed<'a>(samples: &Samples<'a>, options: &FitOptions) -> Option<Samples<'a>> {
     options.bootstrap.map(|_| samples.listed(|_| true))
 }
 
-/// Standard deviation of every parameter over the redrawn data, where that is asked for.
+/// Standard deviation of every parameter over the redrawn data, where that is asked for. None is begun that would end after `deadline`, unless
+/// there are fewer than [`LEAST`].
 pub(super) fn bootstrap(
     listed: Option<&Samples<'_>>,
     part: &Part,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
-) -> Result<Option<Vec<f64>>, FitError> {
+    deadline: Option<Instant>,
+) -> Result<Option<Redrawn>, FitError> {
     let Some((draws, all)) = options.bootstrap.zip(listed) else { return Ok(None) };
     let parameters = part.uncertainty.errors.len();
     let (mut sum, mut squares) = (DVector::<f64>::zeros(parameters), DVector::<f64>::zeros(parameters));
     let centre = flat(&part.solution);
+    let is_late = |more: Duration| deadline.is_some_and(|deadline| Instant::now() + more >= deadline);
+    let (mut drawn, mut last) = (0, Duration::ZERO);
     for replicate in 0..draws.replicates {
+        if drawn >= LEAST && is_late(last) {
+            break;
+        }
+        let began = Instant::now();
         let redrawn = redrawn(all, draws.seed, replicate)?;
         let solution = part::refit(&redrawn, part, model, ranges, options)?;
         let moved = flat(&solution) - &centre;
         squares += moved.component_mul(&moved);
         sum += moved;
+        drawn += 1;
+        last = began.elapsed();
     }
-    let n = f64::from(draws.replicates);
+    let n = f64::from(drawn);
     let deviation = |(q, s): (&f64, &f64)| ((q - s * s / n) / (n - 1.0)).max(0.0).sqrt();
-    Ok(Some(squares.iter().zip(sum.iter()).map(deviation).collect()))
+    Ok(Some(Redrawn { deviation: squares.iter().zip(sum.iter()).map(deviation).collect(), replicates: drawn }))
 }
 
 /// How long that would take, by the time of the first replicate.

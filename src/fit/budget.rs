@@ -2,14 +2,14 @@
 
 use std::time::{Duration, Instant};
 
-use super::bootstrap;
+use super::bootstrap::{self, Redrawn};
 use super::covariance::Uncertainty;
 use super::limits::Ranges;
 use super::loss::Loss;
 use super::options::{FitError, FitOptions};
 use super::part::{self, Part};
 use super::samples::{Samples, Thin};
-use crate::brdf::ModelSpec;
+use crate::brdf::{FitRecord, ModelSpec};
 use crate::measurement::{Directions, Measurement};
 use crate::numeric::stats::chi_square_quantile;
 
@@ -43,7 +43,7 @@ pub(super) fn share(budget: Duration, elapsed: Duration, left: usize) -> Duratio
 }
 
 /// Fits growing parts of the samples until the target is met or the time would be exceeded; all of them where that is possible.
-/// What is asked for beside the fit is made of the samples that it ended with, and its time counts too.
+/// What is asked for beside the fit is made of the samples that it ended with, and its time counts too; drawings end with the time.
 pub(super) fn fit(
     measurement: &Measurement,
     model: &ModelSpec,
@@ -81,8 +81,49 @@ pub(super) fn fit(
             }
             part.subset = Some(subset);
         }
-        part.bootstrap = bootstrap::bootstrap(listed.as_ref(), &part, model, ranges, options)?;
+        let deadline = time.and_then(|time| clock.checked_add(time));
+        part.bootstrap = bootstrap::bootstrap(listed.as_ref(), &part, model, ranges, options, deadline)?;
         return Ok(part);
+    }
+}
+
+/// A budget that is exceeded by less is not worth a word.
+const WORD: f64 = 1.02;
+
+/// Tells the record what the time left undone, and by how much it was exceeded.
+pub(super) fn tell(record: &mut FitRecord, parts: &[Part], options: &FitOptions, elapsed: Duration) {
+    if let Some((asked, record_of)) = options.bootstrap.zip(record.bootstrap.as_mut()) {
+        // Channels fitted apart may have been drawn differently often; the least is told.
+        let drawn = parts.iter().filter_map(|p| p.bootstrap.as_ref()).map(|b: &Redrawn| b.replicates).min();
+        record_of.replicates = u64::from(drawn.unwrap_or(0));
+        if drawn.is_some_and(|drawn| drawn < asked.replicates) {
+            record.warnings.push(format!(
+                "the time ended after {} of {} drawings of the bootstrap",
+                record_of.replicates, asked.replicates
+            ));
+        }
+    }
+    if let Some(budget) = options.time_budget.filter(|budget| elapsed > budget.mul_f64(WORD)) {
+        let least = match options.bootstrap {
+            Some(_) => format!("a first round and {} drawings always run", bootstrap::LEAST),
+            None => "a first round always runs".into(),
+        };
+        record.warnings.push(format!(
+            "the fit took {}, {} more than its time budget: {least}",
+            in_words(elapsed),
+            in_words(elapsed.saturating_sub(budget))
+        ));
+    }
+}
+
+/// A time to two digits or so.
+fn in_words(time: Duration) -> String {
+    let seconds = time.as_secs_f64();
+    match seconds {
+        s if s >= 10.0 => format!("{s:.0} s"),
+        s if s >= 1.0 => format!("{s:.1} s"),
+        s if s >= 0.01 => format!("{:.0} ms", 1e3 * s),
+        s => format!("{:.1} ms", 1e3 * s),
     }
 }
 

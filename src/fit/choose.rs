@@ -1,7 +1,7 @@
 //! Which model? Candidates compared by the error on directions that they were not fitted to.
 
 use std::fmt::Write;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::limits::{Limit, Ranges};
 use super::options::{FitError, FitOptions};
@@ -9,7 +9,7 @@ use super::part;
 use super::passes::{self, Saturation, Want};
 use super::reduced::Solution;
 use super::samples::{Samples, Thin};
-use super::{Fitted, fit};
+use super::{Fitted, fit_since};
 use crate::brdf::{ModelCandidate, ModelChoice, ModelSpec};
 use crate::geometry::theta_of;
 use crate::measurement::{Directions, Measurement, MerlGrid};
@@ -21,18 +21,30 @@ const CANDIDATES: [&str; 6] =
 const FOLDS: usize = 5;
 /// Side of the cells in (θi, θo) that are held out whole, degrees: neighbours of a sample don't tell what its value is.
 const CELL_DEG: f64 = 10.0;
-/// Samples that the comparison looks at.
+/// Entries that the comparison looks at, at most.
 const SAMPLES: usize = 40_000;
+/// Runs of neighbours that the entries of a grid come in, or more.
+const RUNS: usize = 200;
+/// Share of a time budget that the comparison may take.
+const COMPARISON: f64 = 0.5;
+/// Entries of the first round where time is short, and by how much the next ones have more.
+const FIRST: usize = 2500;
+const GROWTH: usize = 4;
+/// The candidates in the order in which a first round takes them: the usual model, then the quick ones.
+const IN_HASTE: [usize; 6] = [2, 0, 1, 3, 4, 5];
+/// A glossy lobe more makes a model take about so many times as long.
+const STEEP: f64 = 6.0;
 /// An rmse below this share of the data's rms is rounding: of two such models neither is the better one.
 const ROUNDING: f64 = 1e-13;
 /// A held-out error within this share of the best is as good.
 const AS_GOOD: f64 = 0.01;
 
 /// Compares all models and fits the simplest one whose held-out error is as good as the best's. `options.model` is not looked at. A limit
-/// concerns the models that have its parameter. The comparison takes its time out of the budget, and the fit has what is left.
+/// concerns the models that have its parameter. The comparison takes half of the time budget at most, with fewer samples or models if need
+/// be, and the fit has what is left.
 ///
 /// # Errors
-/// As [`fit`]; a limit that concerns no model.
+/// As [`super::fit`]; a limit that concerns no model.
 pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
     let clock = Instant::now();
     options.validate(measurement)?;
@@ -41,14 +53,14 @@ pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result
         let last = models.last().filter(|_| !models.iter().any(|m| concerns(limit, m, measurement)));
         last.map_or(Ok(()), |richest| ranges_of(limit, richest, measurement).map(|_| ()))?;
     }
-    let choice = choose(&compare(&models, measurement, options)?);
+    let compared = compare(&models, measurement, options, clock)?;
+    let choice = choose(&compared.tried);
     let model = choice.chosen.parse().map_err(|_| FitError::Solver { reason: "no model was chosen".into() })?;
     let (limits, idle): (Vec<Limit>, Vec<Limit>) =
         options.limits.iter().cloned().partition(|limit| concerns(limit, &model, measurement));
-    let time_budget = options.time_budget.map(|budget| budget.saturating_sub(clock.elapsed()));
-    let mut fitted = fit(measurement, &FitOptions { model, limits, time_budget, ..options.clone() })?;
+    let mut fitted = fit_since(clock, measurement, &FitOptions { model, limits, ..options.clone() })?;
     if let Some(record) = &mut fitted.material.fit {
-        record.seconds = clock.elapsed().as_secs_f64();
+        record.warnings.extend(compared.warnings(&models, measurement));
         let said = idle.iter().map(|limit| format!("{limit} limits nothing: {} has no such parameter", choice.chosen));
         record.warnings.extend(said);
         record.choice = Some(choice);
@@ -65,20 +77,94 @@ fn models(measurement: &Measurement, options: &FitOptions) -> Result<Vec<ModelSp
     CANDIDATES.into_iter().map(model).collect()
 }
 
-/// Every model's errors.
-fn compare(models: &[ModelSpec], measurement: &Measurement, options: &FitOptions) -> Result<Vec<Tried>, FitError> {
-    let mut candidates = Vec::new();
-    let mut effective = None;
-    // The richest first: its residuals set the robust scale by which all are judged.
+/// What was compared, simplest first.
+struct Compared {
+    tried: Vec<Tried>,
+    /// Entries of the measurement that were looked at, at most.
+    entries: usize,
+}
+
+impl Compared {
+    /// What the time left out.
+    fn warnings(&self, models: &[ModelSpec], measurement: &Measurement) -> Vec<String> {
+        let mut list = Vec::new();
+        let is_tried = |name: &String| self.tried.iter().any(|t| t.candidate.model == *name);
+        let not: Vec<String> = models.iter().map(ToString::to_string).filter(|name| !is_tried(name)).collect();
+        if !not.is_empty() {
+            list.push(format!("the time ended the comparison of models before {} were looked at", not.join(", ")));
+        }
+        let part = self.tried.first().and_then(|t| t.part).filter(|_| self.entries < SAMPLES.min(measurement.len()));
+        list.extend(part.map(|part| format!("the time left {part} directions for the comparison of models")));
+        list
+    }
+}
+
+/// Every model's errors, on as many samples as the time allows. The first round does not begin a model that would end too late.
+fn compare(
+    models: &[ModelSpec],
+    measurement: &Measurement,
+    options: &FitOptions,
+    clock: Instant,
+) -> Result<Compared, FitError> {
+    let richest_first: Vec<usize> = (0..models.len()).rev().collect();
+    let Some(budget) = options.time_budget else {
+        let tried = compare_on(SAMPLES, models, &richest_first, measurement, options, None)?;
+        return Ok(Compared { tried, entries: SAMPLES });
+    };
+    let time = budget.mul_f64(COMPARISON);
+    let late = |more: Duration| clock.elapsed() + more > time;
+    let mut entries = FIRST;
+    loop {
+        let began = Instant::now();
+        let all = entries >= SAMPLES.min(measurement.len());
+        let (order, late_for): (&[usize], Option<&dyn Fn(Duration) -> bool>) =
+            if entries == FIRST { (&IN_HASTE, Some(&late)) } else { (&richest_first, None) };
+        match compare_on(entries, models, order, measurement, options, late_for) {
+            Err(FitError::NothingToFit { .. }) if !all => {} // what counts may be among the others
+            Ok(tried) => {
+                let cut = tried.len() < models.len();
+                if all || cut || late(began.elapsed().mul_f64(GROWTH as f64)) {
+                    return Ok(Compared { tried, entries });
+                }
+            }
+            Err(error) => return Err(error),
+        }
+        entries *= GROWTH;
+    }
+}
+
+/// Models' errors on so many entries of the measurement, simplest first; those that `late` says would end too late are left out, the first
+/// in `order` never.
+fn compare_on(
+    entries: usize,
+    models: &[ModelSpec],
+    order: &[usize],
+    measurement: &Measurement,
+    options: &FitOptions,
+    late: Option<&dyn Fn(Duration) -> bool>,
+) -> Result<Vec<Tried>, FitError> {
+    let mut numbered = Vec::new();
+    // The first one's residuals set the robust scale by which all are judged.
     let mut common = None;
-    for model in models.iter().rev() {
+    let mut of_one_lobe = None;
+    for (place, model) in order.iter().filter_map(|&place| Some((place, models.get(place)?))) {
+        let began = Instant::now();
+        let glossy = model.lobes().iter().filter(|k| !k.lobe().parameters().is_empty()).count();
+        let needed = of_one_lobe.map(|time: Duration| time.mul_f64(STEEP.powi(glossy as i32 - 1)));
+        if late.zip(needed).is_some_and(|(late, needed)| late(needed)) {
+            continue;
+        }
         let limits = options.limits.iter().filter(|l| concerns(l, model, measurement)).cloned().collect();
         let own = FitOptions { model: model.clone(), limits, bootstrap: None, time_budget: None, ..options.clone() };
-        let tried = candidate(measurement, &own, &mut common)?;
-        // Residuals are the less alike the better the model: the richest one's tell best how many there are.
-        effective = effective.or(tried.effective);
-        candidates.insert(0, tried);
+        numbered.push((place, candidate(measurement, &own, entries, &mut common)?));
+        if glossy == 1 {
+            of_one_lobe = Some(began.elapsed());
+        }
     }
+    numbered.sort_by_key(|(place, _)| *place);
+    let mut candidates: Vec<Tried> = numbered.into_iter().map(|(_, tried)| tried).collect();
+    // Residuals are the less alike the better the model: the richest one's tell best how many there are.
+    let effective = candidates.iter().rev().find_map(|tried| tried.effective);
     for tried in &mut candidates {
         tried.candidate.judge(effective.unwrap_or(measurement.len() as f64), tried.rounding);
     }
@@ -90,15 +176,17 @@ fn compare(models: &[ModelSpec], measurement: &Measurement, options: &FitOptions
 fn candidate(
     measurement: &Measurement,
     options: &FitOptions,
+    entries: usize,
     common: &mut Option<Vec<Saturation>>,
 ) -> Result<Tried, FitError> {
     let model = options.model_for(measurement)?;
     let ranges = Ranges::new(&model, &measurement.channels, &options.limits)?;
     let all: Vec<usize> = (0..measurement.channels.len()).collect();
     let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![&all] };
-    // Whole lines of a table, so that neighbours stay neighbours.
-    let run = if matches!(measurement.directions, Directions::Merl(_)) { MerlGrid::PHI_D } else { 1 };
-    let thin = Thin { step: measurement.len().div_ceil(SAMPLES), run };
+    // Pieces of a table's lines, whole ones where there are enough, so that neighbours stay neighbours.
+    let is_grid = matches!(measurement.directions, Directions::Merl(_));
+    let run = if is_grid { (entries / RUNS).clamp(1, MerlGrid::PHI_D) } else { 1 };
+    let thin = Thin { step: measurement.len().div_ceil(entries), run };
     let (mut cost, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
     let mut effective = Some(0.0);
     let mut energy = 0.0;
@@ -230,7 +318,7 @@ fn choose(tried: &[Tried]) -> ModelChoice {
         excess <= AS_GOOD.max(error)
     };
     let chosen = tried.iter().filter(good).min_by_key(|t| t.candidate.parameters).unwrap_or(best);
-    let mut reason = why(chosen, best);
+    let mut reason = why(chosen, best, tried.len());
     let simpler = tried.iter().filter(|t| t.candidate.parameters < chosen.candidate.parameters);
     if let Some(next) = simpler.map(Tried::error).min_by(f64::total_cmp) {
         let _ = write!(reason, "; the best simpler model's is {}", higher(next / chosen.error()));
@@ -239,7 +327,10 @@ fn choose(tried: &[Tried]) -> ModelChoice {
 }
 
 /// Why `chosen` and not `best`.
-fn why(chosen: &Tried, best: &Tried) -> String {
+fn why(chosen: &Tried, best: &Tried, tried: usize) -> String {
+    if tried == 1 {
+        return "the only model that there was time to look at".into();
+    }
     if chosen.is_exact() {
         return "the simplest model whose held-out error is no more than rounding".into();
     }

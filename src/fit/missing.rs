@@ -1,5 +1,6 @@
-//! Values that a table lacks where a fit looks: masked ones, and channels without a positive one.
+//! What a table lacks, or has too much of, where a fit looks: masked values, values without σ, channels without a positive one, copies.
 
+use super::copies;
 use super::merl_lines::MerlLines;
 use super::options::FitOptions;
 use crate::measurement::{Directions, Measurement, MerlGrid};
@@ -15,7 +16,38 @@ pub(super) fn warnings(measurement: &Measurement, options: &FitOptions, valid: O
     let left_out = format!("{missing} of {all} values are missing (NaN or masked in the file) and were left out");
     let dark = (0..measurement.channels.len()).filter(|c| is_dark(measurement.plane(*c)));
     let dark = dark.map(|c| format!("channel {} has no positive value", measurement.channels[c]));
-    (missing > 0).then_some(left_out).into_iter().chain(dark).collect()
+    let least_cos = options.max_angle_deg.to_radians().cos() - INCLUSIVE;
+    let counts = |entry: usize| is_inside(measurement, options.stride, least_cos, entry);
+    let copies = copies::warning(measurement, counts);
+    (missing > 0).then_some(left_out).into_iter().chain(exact(measurement, options)).chain(dark).chain(copies).collect()
+}
+
+/// Says how many valid values weights by σ leave out for want of one.
+fn exact(measurement: &Measurement, options: &FitOptions) -> Option<String> {
+    let sigma = measurement.sigma.as_ref().filter(|_| options.use_sigma)?;
+    let least_cos = options.max_angle_deg.to_radians().cos() - INCLUSIVE;
+    let (entries, channels) = (measurement.len(), measurement.channels.len());
+    let of_entry = |(without, all): (usize, usize), entry: usize| {
+        let valid = (0..channels).map(|c| c * entries + entry).filter(|&i| !measurement.values[i].is_nan());
+        let (gone, valid): (usize, usize) =
+            valid.fold((0, 0), |(g, v), i| (g + usize::from(sigma[i] == 0.0 || sigma[i].is_nan()), v + 1));
+        (without + gone, all + valid)
+    };
+    let blocks = map_blocks(entries, |block| {
+        block.filter(|entry| is_inside(measurement, options.stride, least_cos, *entry)).fold((0, 0), of_entry)
+    });
+    let (without, all) = blocks.iter().fold((0, 0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+    (without > 0).then(|| {
+        format!(
+            "{without} of {all} values were left out, for their stated sigma is 0: weights by sigma need a positive one"
+        )
+    })
+}
+
+/// Whether an entry is one of the stride's and within the angular limit.
+fn is_inside(measurement: &Measurement, stride: usize, least_cos: f64, entry: usize) -> bool {
+    let (wi, wo) = measurement.directions.pair(entry);
+    entry.is_multiple_of(stride) && wi.z.min(wo.z) >= least_cos.max(f64::MIN_POSITIVE)
 }
 
 /// Whether there are values and none of them is positive.
@@ -52,13 +84,9 @@ fn of_grid(measurement: &Measurement, grid: MerlGrid, least_cos: f64, valid: Opt
 }
 
 fn of_list(measurement: &Measurement, stride: usize, least_cos: f64) -> Vec<(usize, usize)> {
-    let inside = |entry: &usize| {
-        let (wi, wo) = measurement.directions.pair(*entry);
-        wi.z.min(wo.z) >= least_cos.max(f64::MIN_POSITIVE)
-    };
     let channels = measurement.channels.len();
     map_blocks(measurement.len(), |block| {
-        let entries = block.filter(|entry| entry.is_multiple_of(stride)).filter(inside);
+        let entries = block.filter(|entry| is_inside(measurement, stride, least_cos, *entry));
         entries.fold((0, 0), |(missing, all), entry| {
             let gone = (0..channels).filter(|c| measurement.plane(*c)[entry].is_nan()).count();
             (missing + gone, all + channels)

@@ -10,6 +10,7 @@ mod bins;
 mod bootstrap;
 mod budget;
 mod choose;
+mod copies;
 mod covariance;
 mod energy;
 mod folded;
@@ -73,7 +74,11 @@ pub struct Fitted {
 /// # Errors
 /// [`FitError`] where the options are wrong or nothing valid is left to fit.
 pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
-    let clock = Instant::now();
+    fit_since(Instant::now(), measurement, options)
+}
+
+/// Fits a model by work that began at `clock`: what is gone of a time budget is gone.
+fn fit_since(clock: Instant, measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
     options.validate(measurement)?;
     let model = options.model_for(measurement)?;
     let ranges = Ranges::new(&model, &measurement.channels, &options.limits)?;
@@ -89,7 +94,9 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
     let facts = record::Facts { measurement, options, model: &model, ranges: &ranges, parts: &parts, samples };
     let mut material = record::material(&facts);
     if let Some(record) = &mut material.fit {
-        record.seconds = clock.elapsed().as_secs_f64();
+        let elapsed = clock.elapsed();
+        record.seconds = elapsed.as_secs_f64();
+        budget::tell(record, &parts, options, elapsed);
     }
     let stop = parts.last().map_or(Stop::MaxIterations, |p| p.stop);
     let history = parts.into_iter().flat_map(|p| p.history).collect();
@@ -138,6 +145,6 @@ fn fit_part(
     let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin::NONE)?;
     let mut part = part::fit(&samples, transforms, model, ranges, options)?;
     part.bootstrap =
-        bootstrap::bootstrap(bootstrap::listed(&samples, options).as_ref(), &part, model, ranges, options)?;
+        bootstrap::bootstrap(bootstrap::listed(&samples, options).as_ref(), &part, model, ranges, options, None)?;
     Ok(part)
 }

@@ -116,6 +116,13 @@ impl FitOptions {
         if self.use_sigma && measurement.sigma.is_none() {
             return wrong("use-sigma", "a measurement that states sigma", "none stated".into());
         }
+        let sigma = measurement.sigma.as_ref().filter(|_| self.use_sigma);
+        if sigma.is_some_and(|sigma| !sigma.iter().any(|s| *s > 0.0)) {
+            return wrong("use-sigma", "a measurement that states a positive sigma", "sigma 0 throughout".into());
+        }
+        if self.time_budget == Some(Duration::ZERO) {
+            return wrong("time-budget", "more than 0", "0".into());
+        }
         Ok(())
     }
 
@@ -199,6 +206,14 @@ pub enum FitError {
     /// A value that is too large to square.
     #[error("{name}: the values reach {largest:e}, whose square overflows; scale them down")]
     Overflow {
+        /// The measurement.
+        name: String,
+        /// Largest value.
+        largest: f64,
+    },
+    /// Values that are too small to square.
+    #[error("{name}: the values reach no more than {largest:e}, whose square underflows; scale them up")]
+    Underflow {
         /// The measurement.
         name: String,
         /// Largest value.

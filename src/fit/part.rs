@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::bootstrap::Redrawn;
 use super::budget::Subset;
 use super::covariance::{self, Uncertainty};
 use super::identify;
@@ -53,8 +54,8 @@ pub(super) struct Part {
     pub report: SearchReport,
     /// How much of the samples it is about, where not all.
     pub subset: Option<Subset>,
-    /// Standard deviation of every parameter over redrawn data, in the uncertainty's order and scale.
-    pub bootstrap: Option<Vec<f64>>,
+    /// What redrawn data say, where they were asked.
+    pub bootstrap: Option<Redrawn>,
 }
 
 impl Part {

@@ -357,7 +357,7 @@ fn the_table_of_models_says_what_it_was_computed_on() {
     let plain = b.ok(&["fit", "p.csv", "--model", "auto"]).text();
     assert!(plain.contains("rmse and held out are in 1/sr\n"), "{plain}");
     let robust = b.ok(&["fit", "p.csv", "--model", "auto", "--robust", "huber"]).text();
-    assert!(robust.contains("robust scale of the richest model"), "{robust}");
+    assert!(robust.contains("with one robust scale for all"), "{robust}");
     b.ok(&["simulate", "--material", "satin", "--scan", "hemisphere:4", "--seed", "1", "--out", "big.csv"]);
     let big = b.ok(&["fit", "big.csv", "--model", "auto", "--out", "big.json"]).text();
     let samples = b.json_file("big.json")["fit"]["choice"]["samples"].as_u64().expect("a count");
@@ -429,7 +429,7 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
     let b = Bench::new();
     b.paint("p.csv");
     b.write("plain.csv", csv(&[(30.0, 10.0, 0.0, 0.1), (30.0, 20.0, 0.0, 0.1)]));
-    let table: [(&[&str], &[&str]); 29] = [
+    let table: [(&[&str], &[&str]); 31] = [
         (&["p.csv", "--fix", "phong.exponent"], &["--fix", "NAME=VALUE"]),
         (&["p.csv", "--fix", "phong.sharpness=2"], &["--fix", "sharpness"]),
         (&["p.csv", "--bound", "phong.exponent=5..1"], &["--bound", "5..1 is empty"]),
@@ -458,6 +458,8 @@ fn limits_and_wishes_that_can_not_be_met_exit_2_and_say_what_is_expected() {
         (&["p.csv", "--use-sigma", "--weights", "uniform"], &["--use-sigma", "--weights", "cannot be used"]),
         (&["p.csv", "--merl-angles", "center"], &["p.csv", "CSV", "--merl-angles"]),
         (&["p.csv", "--time-budget", "soon"], &["--time-budget", "2s"]),
+        (&["p.csv", "--time-budget", "0"], &["--time-budget", "more than 0"]),
+        (&["p.csv", "--time-budget", "0ms"], &["--time-budget", "more than 0"]),
         (&["p.csv", "--target-rmse-excess", "-1%"], &["--target-rmse-excess", "positive share"]),
         (&["p.csv", "--target-rmse-excess", "little"], &["--target-rmse-excess", "1%"]),
         (&["p.csv", "--bootstrap", "1"], &["--bootstrap", "2..=100000"]),
@@ -574,4 +576,27 @@ fn flat_one_dimensional_and_in_plane_measurements_are_fitted() {
             assert!((got / want - 1.0).abs() < 1e-6, "{file}: {got} vs {want}");
         }
     }
+}
+
+#[test]
+fn a_quantity_that_overrides_the_files_own_is_noted() {
+    let b = Bench::new();
+    b.paint("p.csv");
+    let stated = "# quantity: brdf\n".to_owned()
+        + &b.text("p.csv").lines().filter(|l| !l.starts_with('#')).collect::<Vec<_>>().join("\n");
+    b.write("s.csv", stated + "\n");
+    let said = |quantity: &[&str]| b.run(&[&["fit", "s.csv", "--model", "lambert"], quantity].concat()).err;
+    assert!(said(&["--quantity", "brdf_cos"]).contains("`# quantity: brdf`; its values are read as brdf_cos"));
+    assert!(!said(&["--quantity", "brdf"]).contains("quantity") && !said(&[]).contains("quantity"));
+}
+
+#[test]
+fn a_criterion_without_a_value_is_a_dash_and_the_file_reads_back() {
+    let b = Bench::new();
+    b.write("few.csv", csv(&[(30.0, 10.0, 0.0, 0.1), (30.0, 20.0, 0.0, 0.11), (40.0, 20.0, 90.0, 0.09)]));
+    let text = b.ok(&["fit", "few.csv", "--model", "auto", "--out", "few.json"]).text();
+    assert!(!text.contains("inf") && text.contains("AICc: — where"), "{text}");
+    let back = goniofit::brdf::Material::from_json(&b.text("few.json")).expect("reads");
+    let choice = back.fit.and_then(|fit| fit.choice).expect("the record is kept");
+    assert!(choice.candidates.iter().any(|c| c.aicc == f64::INFINITY), "{choice:?}");
 }

@@ -1,8 +1,8 @@
 //! What a fit must say of itself: numbers that can't be trusted are named, and no number is made up.
 
-use goniofit::fit::{FitOptions, Loss};
+use goniofit::fit::{FitOptions, Limit, Loss, fit};
 use goniofit::gonio::{Instrument, Scan};
-use goniofit::measurement::Measurement;
+use goniofit::measurement::{Directions, Measurement};
 
 use crate::support::*;
 
@@ -123,4 +123,67 @@ fn residuals_that_can_not_be_judged_are_said_to_be_so() {
     m.sigma = None;
     let got = solved(&m, &FitOptions { stride: 50, ..options("lambert+phong") });
     assert!(record(&got).residual.is_none() && says(&got, "can't be told"), "{got:?}");
+}
+
+/// A table pasted twice knows no more than once, whatever its standard errors say.
+#[test]
+fn copied_readings_are_told_from_honest_repeats() {
+    let scan = HEMISPHERE(15.0);
+    let (once, again) = (noisy(1e4, &scan, 2), noisy(1e4, &scan, 3));
+    let beside = |other: &Measurement| {
+        let list = |m: &Measurement| (0..m.len()).map(|i| m.directions.pair(i)).collect::<Vec<_>>();
+        let (wi, wo) = [list(&once), list(other)].concat().into_iter().unzip();
+        let values = (0..3).flat_map(|c| [once.plane(c), other.plane(c)].concat()).collect();
+        Measurement::new("both", Directions::List { wi, wo }, once.channels.clone(), values)
+    };
+    let words = "directions occur again with identical values";
+    for (m, want) in [(&once, false), (&beside(&once), true), (&beside(&again), false)] {
+        for o in [options("lambert+phong"), FitOptions { loss: Loss::Log, ..options("lambert") }] {
+            assert_eq!(says(&solved(m, &o), words), want, "{:?}", record(&solved(m, &o)).warnings);
+        }
+    }
+}
+
+/// Weights by σ leave out what has none, and say how much that is.
+#[test]
+fn values_without_a_sigma_are_counted_where_sigma_weighs() {
+    let mut m = noisy(1e4, &HEMISPHERE(15.0), 2);
+    let sigma = m.sigma.as_mut().expect("stated");
+    sigma.iter_mut().step_by(5).for_each(|s| *s = 0.0);
+    let weighed = FitOptions { use_sigma: true, ..options("lambert+phong") };
+    let got = solved(&m, &weighed);
+    assert!(says(&got, "values were left out, for their stated sigma is 0"), "{:?}", record(&got).warnings);
+    assert!(!says(&solved(&m, &options("lambert+phong")), "stated sigma is 0"));
+    m.sigma.as_mut().expect("stated").fill(0.0);
+    let error = fit(&m, &weighed).expect_err("no weight").to_string();
+    assert!(error.contains("use-sigma") && error.contains("positive sigma"), "{error}");
+}
+
+/// Where nothing is free there are no standard errors to speak of.
+#[test]
+fn a_fit_of_held_parameters_does_not_speak_of_standard_errors() {
+    let m = noisy(1e4, &HEMISPHERE(15.0), 2);
+    let held =
+        ["lambert.weight=0.1", "phong.weight=0.1", "phong.exponent=20"].map(|t| Limit::fixed(t).expect("a limit"));
+    let got = solved(&m, &FitOptions { limits: held.to_vec(), ..options("lambert+phong") });
+    assert!(says(&got, "does not describe these data") && !says(&got, "standard error"), "{:?}", record(&got).warnings);
+    let free = FitOptions { limits: held[..2].to_vec(), ..options("lambert+phong") };
+    assert!(says(&solved(&m, &free), "standard error"));
+}
+
+/// Values whose squares are no numbers any more are refused by name, small or large.
+#[test]
+fn values_too_small_or_too_large_to_square_are_named() {
+    let m = noisy(1e4, &HEMISPHERE(15.0), 2);
+    let scaled = |factor: f64| {
+        let values = m.values.iter().map(|v| factor * v).collect();
+        Measurement::new("m", m.directions.clone(), m.channels.clone(), values)
+    };
+    for o in [options("lambert+phong"), FitOptions { loss: Loss::Relative, ..options("lambert") }] {
+        for (factor, word) in [(1e-320, "underflows"), (1e-200, "underflows"), (1e200, "overflows")] {
+            let error = fit(&scaled(factor), &o).expect_err("no square").to_string();
+            assert!(error.contains(word), "{factor:e}: {error}");
+        }
+        assert!(fit(&scaled(1e-150), &o).is_ok());
+    }
 }

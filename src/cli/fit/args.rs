@@ -59,7 +59,7 @@ pub(in crate::cli) struct Args {
     /// Fit under the constraint that no channel reflects more light than it receives
     #[arg(long, help_heading = MODEL)]
     pub conserve_energy: bool,
-    /// Time that the fit may take, bootstrap included, 50ms or 2s say: it uses as many samples as that allows
+    /// Time that the fit may take, bootstrap included, 50ms or 2s say: it uses as many samples, and drawings, as that allows
     #[arg(long, value_name = "TIME", value_parser = parse_time, help_heading = EFFORT)]
     pub time_budget: Option<Duration>,
     /// Stop at a part of the samples once the rmse over all is within this share of the best (1%, say) with 95 % confidence
@@ -112,7 +112,14 @@ fn parse_weights(text: &str) -> Result<WeightMode, String> {
 
 /// `50ms` or `2s`.
 fn parse_time(text: &str) -> Result<Duration, String> {
-    humantime::parse_duration(text).map_err(|_| "expected a time, 50ms or 2s say".into())
+    if text.trim() == "0" {
+        return Err("expected a time of more than 0, 50ms or 2s say".into());
+    }
+    match humantime::parse_duration(text) {
+        Ok(Duration::ZERO) => Err("expected a time of more than 0, 50ms or 2s say".into()),
+        Ok(time) => Ok(time),
+        Err(_) => Err("expected a time, 50ms or 2s say".into()),
+    }
 }
 
 /// `1%` or `0.01`.

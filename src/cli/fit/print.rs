@@ -73,7 +73,8 @@ fn small(x: f64, places: usize) -> String {
     if x == 0.0 { "0".into() } else { format!("{x:.places$e}") }
 }
 
-/// One line a parameter; its interval only where the error does not tell it: where it is lopsided.
+/// One line a parameter; its interval only where the error does not tell it: where it is lopsided or
+/// wider than the error makes it.
 fn parameter(t: &mut String, record: &FitRecord, label: &str, value: f64, (error, interval): Stated) {
     let open = record.undetermined.iter().any(|name| name == label);
     let half_width = interval.map(|(low, high)| (high - low) / 2.0);
@@ -85,13 +86,16 @@ fn parameter(t: &mut String, record: &FitRecord, label: &str, value: f64, (error
     let _ = write!(t, "  {label:22} {shown}");
     if let Some((low, high)) = interval {
         let (below, above) = (value - low, high - value);
-        if below.max(above) > LOPSIDED * below.min(above) {
+        let wide = error.is_some_and(|error| above + below > WIDE * error);
+        if wide || below.max(above) > LOPSIDED * below.min(above) {
             let _ = write!(t, "  (95 %: {} to {})", digits.show(low), digits.show(high));
         }
     }
     t.push('\n');
 }
 
+/// Width of an interval over the standard error from which it is shown; 3.92 is usual.
+const WIDE: f64 = 4.8;
 /// Halves of an interval that differ by more than this factor are shown.
 const LOPSIDED: f64 = 1.2;
 
@@ -202,14 +206,26 @@ fn comparison(choice: &ModelChoice, record: &FitRecord, unit: &str) -> String {
         let mark = if c.model == choice.chosen { "*" } else { " " };
         let _ = writeln!(
             t,
-            "{mark} {:width$} {:4} {:10.3e} {:10.3e} {:10.1} {:10.1}",
-            c.model, c.parameters, c.rmse, c.held_out_rmse, c.aicc, c.bic
+            "{mark} {:width$} {:4} {:10.3e} {:10.3e} {:>10} {:>10}",
+            c.model,
+            c.parameters,
+            c.rmse,
+            c.held_out_rmse,
+            criterion(c.aicc),
+            criterion(c.bic)
         );
     }
-    for line in [basis(choice, record, unit), Some(format!("chosen: {}: {}", choice.chosen, choice.reason))] {
+    let open = choice.candidates.iter().any(|c| !c.aicc.is_finite());
+    let few = open.then(|| "AICc: — where the independent values are too few for so many parameters".to_owned());
+    for line in [basis(choice, record, unit), few, Some(format!("chosen: {}: {}", choice.chosen, choice.reason))] {
         line.iter().for_each(|line| t.push_str(&hanging(line)));
     }
     t
+}
+
+/// One decimal; a criterion that has no value is a dash.
+fn criterion(x: f64) -> String {
+    if x.is_finite() { format!("{x:.1}") } else { "—".into() }
 }
 
 /// What the table's rmse are of: their unit, and why the chosen model's differs from that of the fit.
@@ -219,7 +235,7 @@ fn basis(choice: &ModelChoice, record: &FitRecord, unit: &str) -> Option<String>
         (None, Some(_)) => Some("of all samples".to_owned()),
         (None, None) => None,
     };
-    let robust = record.robust.as_ref().map(|_| "with the robust scale of the richest model for all".to_owned());
+    let robust = record.robust.as_ref().map(|_| "with one robust scale for all".to_owned());
     let unit = (!unit.is_empty()).then(|| format!("in{unit}"));
     let differs = part.is_some() || robust.is_some();
     let facts: Vec<String> = [unit, part, robust].into_iter().flatten().collect();

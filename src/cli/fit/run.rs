@@ -119,6 +119,9 @@ fn refused(args: &Args, file: &Path, error: FitError) -> Failure {
         FitError::Limit { name, .. } if held(name) => ("--fix ", String::new()),
         FitError::Limit { .. } => ("--bound ", String::new()),
         FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)".to_owned()),
+        FitError::NothingToFit { weightless: 1.., .. } if args.use_sigma => {
+            ("", " (--use-sigma gives weight 0 where sigma is not positive)".to_owned())
+        }
         FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)".to_owned()),
         FitError::Solver { .. } => (&own[..], String::new()),
         FitError::Option { .. } if several => ("", format!(" ({})", file.display())),

@@ -1,7 +1,7 @@
 //! What a fit says of itself in words.
 
 use super::Facts;
-use crate::brdf::{FitRecord, Material};
+use crate::brdf::{FitRecord, LobeRecord, Material, PerChannel};
 use crate::fit::loss::Loss;
 use crate::fit::options::WeightMode;
 use crate::fit::{energy, missing};
@@ -141,8 +141,9 @@ impl Facts<'_> {
             .filter(|r| linear && r.noise_from == "sigma" && record.rmse < OVERSTATED * r.noise_rmse)
         {
             list.push(format!(
-                "the residuals are {:.1} times smaller than the stated σ: it may be overstated, and the standard errors with it",
-                residual.noise_rmse / record.rmse
+                "the residuals are {:.1} times smaller than the stated σ: it may be overstated{}",
+                residual.noise_rmse / record.rmse,
+                of_errors(record, ", and the standard errors with it")
             ));
         }
         let leaning: usize = self.parts.iter().filter_map(|p| p.uncertainty.leaning).sum();
@@ -173,11 +174,14 @@ impl Facts<'_> {
         };
         Some(format!(
             "the model does not describe these data: {:.0} % of the residuals' variance is structure, not noise (model error \
-             {:.3e}{unit}, noise {:.1e}{unit}); the standard errors are of noise alone, `model_error` says how far the model's own error \
-             moves the parameters",
+             {:.3e}{unit}, noise {:.1e}{unit}){}",
             100.0 * residual.structured_share,
             residual.model_rmse,
             residual.noise_rmse,
+            of_errors(
+                record,
+                "; the standard errors are of noise alone, `model_error` says how far the model's own error moves the parameters"
+            )
         ))
     }
 }
@@ -209,6 +213,18 @@ fn unsettled_warning(left: f64) -> String {
          parameters are those of the latter",
         100.0 * left.exp_m1().abs()
     )
+}
+
+/// What is said of standard errors, nothing where all parameters are held and have none.
+fn of_errors<'a>(record: &FitRecord, clause: &'a str) -> &'a str {
+    let held = |error: &Option<f64>| *error == Some(0.0);
+    let shape = |of: &PerChannel<Option<f64>>| match of {
+        PerChannel::Shared(error) => held(error),
+        PerChannel::Each(list) => list.iter().all(held),
+    };
+    let all =
+        |lobe: &LobeRecord<Option<f64>>| lobe.weight.iter().all(held) && lobe.shape.iter().all(|(_, of)| shape(of));
+    if record.standard_error.iter().all(all) { "" } else { clause }
 }
 
 /// Residuals below this share of the stated σ are worth a word.

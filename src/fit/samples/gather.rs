@@ -226,6 +226,9 @@ impl<'a> Samples<'a> {
         if !(largest * largest * survey.directions as f64).is_finite() {
             return Err(FitError::Overflow { name: name.clone(), largest });
         }
+        if largest > 0.0 && largest * largest < f64::MIN_POSITIVE {
+            return Err(FitError::Underflow { name: name.clone(), largest });
+        }
         self.count = survey.directions;
         self.counts.clone_from(&survey.counts);
         if self.loss.is_homogeneous() && largest > 0.0 {

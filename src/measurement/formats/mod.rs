@@ -107,6 +107,17 @@ pub enum Quantity {
     BrdfCos,
 }
 
+impl Quantity {
+    /// The name that options and files use.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brdf => "brdf",
+            Self::BrdfCos => "brdf_cos",
+        }
+    }
+}
+
 /// How to read a file.
 #[derive(Debug, Clone, Default)]
 pub struct ReadOptions {

@@ -11,7 +11,8 @@ use crate::measurement::{Dimension, MeasurementError, MerlAngles};
 /// What the comments say.
 #[derive(Debug, Default)]
 pub(super) struct Comments {
-    pub(super) quantity: Quantity,
+    /// Where it is stated.
+    pub(super) quantity: Option<Quantity>,
     pub(super) dimension: Dimension,
     pub(super) grid: Option<MerlAngles>,
     pub(super) solid_angle: bool,
@@ -54,11 +55,9 @@ impl Comments {
         let value = value.trim();
         match key.trim() {
             "quantity" => {
-                self.quantity = match value {
-                    "brdf" => Quantity::Brdf,
-                    "brdf_cos" => Quantity::BrdfCos,
-                    _ => return Err(line.invalid("quantity", "brdf or brdf_cos", quoted(value))),
-                }
+                let known = [Quantity::Brdf, Quantity::BrdfCos].into_iter().find(|q| q.name() == value);
+                let unknown = || line.invalid("quantity", "brdf or brdf_cos", quoted(value));
+                self.quantity = Some(known.ok_or_else(unknown)?);
             }
             "dimension" => {
                 self.dimension = match value {
@@ -158,8 +157,11 @@ fn refuse_raw_readings(line: Line<'_>, names: &[String]) -> Result<(), Measureme
 }
 
 fn missing(line: Line<'_>, name: &str, dimension: Dimension) -> MeasurementError {
-    let hint = if line.text.contains(';') && !line.text.contains(',') {
+    let one_cell = !line.text.contains(',');
+    let hint = if one_cell && line.text.contains(';') {
         " (columns are separated by commas, not semicolons)"
+    } else if one_cell && line.text.trim().contains('\t') {
+        " (columns are separated by commas, not tabs)"
     } else if dimension == Dimension::Space && name.starts_with("phi_") {
         " (an in-plane scan of the flat world says so by a line `# dimension: 2`)"
     } else {

@@ -34,7 +34,8 @@ pub(in crate::measurement::formats) fn read_directions(
 fn read_table(source: &Source, options: &ReadOptions, needs: Needs) -> Result<Measurement, MeasurementError> {
     let mut lines = Lines::new(source)?;
     let (comments, columns) = header::read(&mut lines, needs)?;
-    let mut table = Table::new(&comments, &columns, options.quantity.unwrap_or(comments.quantity));
+    let stated = comments.quantity.unwrap_or_default();
+    let mut table = Table::new(&comments, &columns, options.quantity.unwrap_or(stated));
     let mut cells = Vec::new();
     while let Some(line) = lines.next_filled()? {
         cells.clear();
@@ -47,8 +48,19 @@ fn read_table(source: &Source, options: &ReadOptions, needs: Needs) -> Result<Me
         return Err(lines.ends_too_early(rows));
     }
     let mut measurement = table.finish(source.name());
+    measurement.notes.extend(overridden(comments.quantity, options.quantity));
     measurement.notes.extend(lines.cut_note());
     Ok(measurement)
+}
+
+/// What to tell where the values are read as something else than the file says.
+fn overridden(stated: Option<Quantity>, asked: Option<Quantity>) -> Option<String> {
+    let (stated, asked) = stated.zip(asked).filter(|(stated, asked)| stated != asked)?;
+    Some(format!(
+        "the file says `# quantity: {}`; its values are read as {}, as asked for",
+        stated.name(),
+        asked.name()
+    ))
 }
 
 /// Where the cells of a row stand.
@@ -177,12 +189,15 @@ impl<'a> Table<'a> {
     ) -> Result<(), MeasurementError> {
         let columns = self.columns;
         if let (Some(sigma), Some(&column)) = (self.sigma.get_mut(channel), columns.sigma.get(channel)) {
-            let value = if valid { not_negative(line, &columns.label(column), cell(column))? } else { f64::NAN };
+            let value =
+                if valid { error_of(line, &columns.label(column), cell(column), not_negative)? } else { f64::NAN };
             sigma.push(divisor.apply(value));
         }
         for (component, of_channel) in self.common.iter_mut().zip(&columns.common) {
             if let (Some(common), Some(&column)) = (component.get_mut(channel), of_channel.get(channel)) {
-                let value = if valid { line.finite(&columns.label(column), cell(column))? } else { f64::NAN };
+                let finite = |line: Line<'_>, column: &str, text: &str| line.finite(column, text);
+                let value =
+                    if valid { error_of(line, &columns.label(column), cell(column), finite)? } else { f64::NAN };
                 common.push(divisor.apply(value));
             }
         }
@@ -206,6 +221,20 @@ impl<'a> Table<'a> {
         measurement.notes.extend(self.comments.notes.iter().cloned());
         measurement
     }
+}
+
+/// The stated error of a value that is there, read by `read`.
+fn error_of(
+    line: Line<'_>,
+    column: &str,
+    text: &str,
+    read: impl FnOnce(Line<'_>, &str, &str) -> Result<f64, MeasurementError>,
+) -> Result<f64, MeasurementError> {
+    if text.is_empty() {
+        let expected = "a number, 1 σ of the value in this row (only where that is empty too may it be left out)";
+        return Err(line.invalid(column, expected, quoted(text)));
+    }
+    read(line, column, text)
 }
 
 /// A finite number ≥ 0.
