@@ -88,7 +88,8 @@ fn mark(
         // Where a sharper one than can be searched does as well, on samples right at the peak, only weight × exponent is known.
         let searched = high >= parameter.bounds.1.ln();
         let unseen = problem.is_invisible(*lobe, high);
-        if low < high && (unseen && unproved(*lobe) || (unseen || searched) && as_good(i, high)) {
+        let dim = unproved(*lobe);
+        if low < high && (unseen && dim || (unseen || searched && !dim) && as_good(i, high)) {
             open.push(shape);
             open.extend((0..channels).map(|c| c * lobes + lobe));
         }
