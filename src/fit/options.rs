@@ -211,8 +211,8 @@ pub enum FitError {
         /// Largest value.
         largest: f64,
     },
-    /// Values that are too small to square.
-    #[error("{name}: the values reach no more than {largest:e}, whose square underflows; scale them up")]
+    /// Values so small that they have lost digits, or are about to.
+    #[error("{name}: the values reach no more than {largest:e}, too small for all digits; scale them up")]
     Underflow {
         /// The measurement.
         name: String,

@@ -226,7 +226,7 @@ impl<'a> Samples<'a> {
         if !(largest * largest * survey.directions as f64).is_finite() {
             return Err(FitError::Overflow { name: name.clone(), largest });
         }
-        if largest > 0.0 && largest * largest < f64::MIN_POSITIVE {
+        if largest > 0.0 && largest < SMALLEST {
             return Err(FitError::Underflow { name: name.clone(), largest });
         }
         self.count = survey.directions;
@@ -256,5 +256,7 @@ fn power_of_two(largest: f64) -> f64 {
     (3.0 * (largest.log2() / 3.0).floor()).exp2()
 }
 
+/// Values below this stand where doubles lose digits.
+const SMALLEST: f64 = 1e-300;
 /// Values between this and its inverse can be squared and summed without scaling.
 const LEAST_UNSCALED: f64 = 1e-100;
