@@ -182,7 +182,7 @@ fn candidate(
     let model = options.model_for(measurement)?;
     let ranges = Ranges::new(&model, &measurement.channels, &options.limits)?;
     let all: Vec<usize> = (0..measurement.channels.len()).collect();
-    let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![&all] };
+    let groups = options.groups(&all);
     // Pieces of a table's lines, whole ones where there are enough, so that neighbours stay neighbours.
     let is_grid = matches!(measurement.directions, Directions::Merl(_));
     let run = if is_grid { (entries / RUNS).clamp(1, MerlGrid::PHI_D) } else { 1 };

@@ -1,5 +1,7 @@
 //! Readings that stand in a list more than once, as in a table pasted twice.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -50,13 +52,11 @@ fn has_same_values(measurement: &Measurement, a: usize, b: usize) -> bool {
     planes().all(|plane| plane[a].to_bits() == plane[b].to_bits()) && planes().any(|plane| !plane[a].is_nan())
 }
 
-/// A number that tells pairs of directions apart, by FNV-1a over words with a final mix.
+/// A number that tells pairs of directions apart.
 fn hash(wi: DVec3, wo: DVec3) -> u64 {
-    let words = [wi.x, wi.y, wi.z, wo.x, wo.y, wo.z].map(f64::to_bits);
-    let mixed = words
-        .iter()
-        .fold(0xcbf2_9ce4_8422_2325, |h: u64, word| (h ^ word).wrapping_mul(0x0100_0000_01b3).rotate_left(29));
-    (mixed ^ (mixed >> 32)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    let mut hasher = DefaultHasher::new();
+    [wi.to_array(), wo.to_array()].map(|w| w.map(f64::to_bits)).hash(&mut hasher);
+    hasher.finish()
 }
 
 #[cfg(test)]

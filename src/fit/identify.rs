@@ -1,10 +1,8 @@
 //! What the data leave open although the cost curves where the search ended: other ends of the range that are as good.
 
-use nalgebra::DVector;
-
 use super::covariance::{Uncertainty, pinned};
 use super::reduced::{Problem, Search, Solution};
-use super::solver::{self, LevenbergMarquardt, SolverOptions};
+use super::solver;
 use super::streamed::Streamed;
 use crate::numeric::stats::chi_square_quantile;
 
@@ -16,10 +14,9 @@ const MANY: usize = 64;
 /// Marks what the data leave open, the transforms knowing the cost.
 pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &mut Uncertainty) {
     let resolved = RESOLVED * search.energy.iter().sum::<f64>();
-    let cost = |held: &Problem<'_>, t: Vec<f64>| {
+    let cost = |held: &Problem<'_>| {
         let search = search.of(held);
-        let lm = LevenbergMarquardt::new(options()).with_bounds(held.bounds.clone());
-        solver::minimize(search.walk(), lm, DVector::from_vec(t), 30).map_or(f64::INFINITY, |found| found.cost)
+        solver::least_cost(search.walk(), &held.bounds, &at.t).unwrap_or(f64::INFINITY)
     };
     let least = search.solve(&at.t).cost.max(0.0);
     mark(search.problem, at, uncertainty, least, resolved, cost);
@@ -27,17 +24,12 @@ pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &mut Un
 
 /// Marks what the data leave open, by passes over `part`, the same problem on few samples.
 pub(super) fn by_passes(part: &Problem<'_>, at: &Solution, uncertainty: &mut Uncertainty) {
-    let cost = |held: &Problem<'_>, t: Vec<f64>| {
+    let cost = |held: &Problem<'_>| {
         let streamed = Streamed::new(held).starting_at(at);
-        let lm = LevenbergMarquardt::new(options()).with_bounds(held.bounds.clone());
-        solver::minimize(&streamed, lm, DVector::from_vec(t), 30).map_or(f64::INFINITY, |found| found.cost)
+        solver::least_cost(&streamed, &held.bounds, &at.t).unwrap_or(f64::INFINITY)
     };
-    let least = cost(part, at.t.clone());
+    let least = cost(part);
     mark(part, at, uncertainty, least, RESOLVED * least, cost);
-}
-
-fn options() -> SolverOptions {
-    SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() }
 }
 
 /// A shape that may as well stand at an end of its range is open, and so is what can't be told apart there: at n → 0 a Phong lobe is the diffuse
@@ -48,19 +40,13 @@ fn mark(
     uncertainty: &mut Uncertainty,
     least: f64,
     resolved: f64,
-    cost: impl Fn(&Problem<'_>, Vec<f64>) -> f64,
+    cost: impl Fn(&Problem<'_>) -> f64,
 ) {
     let (channels, lobes) = (at.weights.len(), problem.kinds.len());
     let freedom = problem.samples.residuals() as f64 - uncertainty.errors.len() as f64;
     // A lobe brings a weight a channel and a shape; the factor is for noise that is not the same everywhere.
     let rise = 1.5 * chi_square_quantile(0.95, channels as f64 + 1.0) * least / freedom.max(1.0) + resolved;
-    let as_good = |i: usize, end: f64| {
-        let mut held = problem.on(problem.samples);
-        held.bounds[i] = (end, end);
-        let mut t = at.t.clone();
-        t[i] = end;
-        cost(&held, t) <= least + rise
-    };
+    let as_good = |i: usize, end: f64| cost(&problem.holding(channels * lobes + i, end)) <= least + rise;
     // A lobe whose weights may all be 0 may stand anywhere.
     let unproved = |lobe: usize| {
         let may_be_0 = |c: usize| {

@@ -6,14 +6,12 @@
 
 use std::cell::RefCell;
 
-use nalgebra::DVector;
-
 use super::covariance::{Interval, Uncertainty};
 use super::joint;
 use super::part::{ROUNDING, SMALL};
 use super::profile::Trail;
 use super::reduced::{Problem, Search, Solution};
-use super::solver::{self, LevenbergMarquardt, SolverOptions};
+use super::solver;
 
 /// Intervals of all parameters, in the uncertainty's order: weights in the fit's scale, shapes as t = ln(shape).
 pub(super) type Intervals = Vec<Option<Interval>>;
@@ -135,7 +133,7 @@ fn differs(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty, i: u
 /// Whether the energy limit decides the channel that weight `i` belongs to.
 fn is_capped(problem: &Problem<'_>, at: &Solution, i: usize) -> bool {
     let c = i / problem.kinds.len();
-    problem.feasible(c).free_at(&at.weights[c]).1
+    problem.is_capped(c, &at.weights[c])
 }
 
 /// Value and range of parameter `i`; a weight's reaches no farther than its channel's energy limit and the others' least leave it.
@@ -153,14 +151,9 @@ fn parameter(problem: &Problem<'_>, at: &Solution, i: usize) -> (f64, (f64, f64)
 
 /// The least cost with parameter `i` held at `value`, from the transforms.
 fn least_cost(search: &Search<'_>, at: &Solution, i: usize, value: f64) -> f64 {
-    let problem = search.problem;
-    let held = problem.holding(i, value);
-    let start = at.t.iter().zip(&held.bounds).map(|(t, (low, high))| t.clamp(*low, *high));
-    let start = DVector::from_iterator(at.t.len(), start);
+    let held = search.problem.holding(i, value);
     let search = search.of(&held);
-    let options = SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() };
-    let lm = LevenbergMarquardt::new(options).with_bounds(held.bounds.clone());
-    solver::minimize(search.walk(), lm, start, 30).map_or(f64::NAN, |found| found.cost)
+    solver::least_cost(search.walk(), &held.bounds, &at.t).unwrap_or(f64::NAN)
 }
 
 /// How finely ends are looked for.

@@ -6,7 +6,7 @@ use argmin::core::Error;
 use nalgebra::{DMatrix, DVector};
 
 use super::passes::{self, Scratch, Want};
-use super::reduced::{Problem, Solution};
+use super::reduced::{Problem, Solution, spread_into};
 use super::samples::Block;
 use super::solver::{self, LevenbergMarquardt, Linearization, Linearize, Outcome, SolverOptions};
 
@@ -44,11 +44,12 @@ pub(super) fn polish(
     steps: u64,
     digits: Digits,
 ) -> Option<Result<(Solution, Outcome), Error>> {
-    let (channels, lobes) = (start.weights.len(), problem.kinds.len());
-    let parameters = channels * lobes + problem.layout.len();
+    let parameters = problem.parameters();
     let only_cost = matches!(digits, Digits::Cost(_));
-    let capped = |c: usize| problem.feasible(c).free_at(&start.weights[c]).1;
-    if !has_few_parameters(problem) || only_cost && problem.cap.is_some() || (0..channels).any(capped) {
+    if !has_few_parameters(problem)
+        || only_cost && problem.cap.is_some()
+        || start.weights.iter().enumerate().any(|(c, x)| problem.is_capped(c, x))
+    {
         return None;
     }
     let dense = !only_cost && problem.samples.residuals() * parameters <= LARGEST;
@@ -72,7 +73,7 @@ pub(super) fn polish(
 
 /// Whether the parameters are few enough to be searched together.
 pub(super) fn has_few_parameters(problem: &Problem<'_>) -> bool {
-    problem.ranges.len() * problem.kinds.len() + problem.layout.len() <= MOST
+    problem.parameters() <= MOST
 }
 
 impl Joint<'_> {
@@ -108,16 +109,13 @@ impl Joint<'_> {
     fn assembled(&self, at: &Solution, want: Want) -> (f64, DMatrix<f64>, DVector<f64>) {
         let problem = self.problem;
         let (channels, lobes) = (at.weights.len(), problem.kinds.len());
-        let parameters = channels * lobes + problem.layout.len();
+        let parameters = problem.parameters();
         let sums = passes::sums(problem.samples, &at.lobes, &at.weights, problem.saturation, want);
         let (mut normal, mut gradient) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
         for (c, sums) in sums.iter().enumerate() {
             let (place, strength) = (problem.place(channels, c), problem.strength(&at.weights[c]));
-            for (i, &a) in place.iter().enumerate() {
-                gradient[a] += strength[i] * sums.gradient[i];
-                let row = place.iter().zip(&strength).enumerate();
-                row.for_each(|(j, (&b, other))| normal[(a, b)] += strength[i] * other * sums.normal[(i, j)]);
-            }
+            place.iter().enumerate().for_each(|(i, &a)| gradient[a] += strength[i] * sums.gradient[i]);
+            spread_into(&mut normal, &sums.normal, &strength, &place);
             if want == Want::Newton {
                 // A lobe's slope is times its weight: ∂²f by both is the bare slope.
                 for (i, (lobe, _)) in problem.layout.iter().enumerate() {
@@ -133,7 +131,7 @@ impl Joint<'_> {
     /// Residuals and Jacobian of every value, robust weights as of here.
     fn by_rows(&self, at: &Solution) -> Linearization {
         let samples = self.problem.samples;
-        let parameters = at.weights.len() * self.problem.kinds.len() + self.problem.layout.len();
+        let parameters = self.problem.parameters();
         let (mut rows, mut residuals, mut cost): (Vec<f64>, Vec<f64>, f64) = (Vec::new(), Vec::new(), 0.0);
         let parts = samples.map_pieces(
             || (Vec::new(), Vec::new(), 0.0, Scratch::default()),

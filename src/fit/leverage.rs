@@ -5,9 +5,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::{spread_into, stated_errors};
+use super::covariance::{data_slopes, stated_errors};
 use super::passes::Scratch;
-use super::reduced::{Problem, Solution};
+use super::reduced::{Problem, Solution, spread_into};
 use super::samples::Block;
 use crate::numeric::stats::student_quantile;
 
@@ -175,7 +175,8 @@ impl Sums {
         // How far all parameters, and the channel's own, move with a pull of 1 on a bare column.
         let moves = bread.select_columns(&place) * &strength;
         let own = &strength * moves.select_rows(&place);
-        let (w, known) = (block.weight(channel), stated_errors(problem, block, channel, &scratch.f));
+        let slopes = data_slopes(problem, block, channel, &scratch.f);
+        let (w, known) = (block.weight(channel), stated_errors(problem, block, channel, &slopes));
         let k = place.len();
         let [mut squares, mut filled, mut lone] = std::array::from_fn(|_| vec![0.0; block.len()]);
         let (mut column, mut moved, mut back) = (DVector::zeros(k), DVector::zeros(bread.nrows()), DVector::zeros(k));

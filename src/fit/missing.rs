@@ -3,11 +3,9 @@
 use super::copies;
 use super::merl_lines::MerlLines;
 use super::options::FitOptions;
+use super::samples::least_cos;
 use crate::measurement::{Directions, Measurement, MerlGrid};
 use crate::numeric::sum::map_blocks;
-
-/// Slack in the cosine that makes the angular limit inclusive whatever the rounding of the direction.
-const INCLUSIVE: f64 = 1e-12;
 
 /// What is to be told of values that are missing. `valid` is how many there are within the angular limit, where a fit to all of a grid has
 /// counted them.
@@ -16,7 +14,7 @@ pub(super) fn warnings(measurement: &Measurement, options: &FitOptions, valid: O
     let left_out = format!("{missing} of {all} values are missing (NaN or masked in the file) and were left out");
     let dark = (0..measurement.channels.len()).filter(|c| is_dark(measurement.plane(*c)));
     let dark = dark.map(|c| format!("channel {} has no positive value", measurement.channels[c]));
-    let least_cos = options.max_angle_deg.to_radians().cos() - INCLUSIVE;
+    let least_cos = least_cos(options);
     let counts = |entry: usize| is_inside(measurement, options.stride, least_cos, entry);
     let copies = copies::warning(measurement, counts);
     (missing > 0).then_some(left_out).into_iter().chain(exact(measurement, options)).chain(dark).chain(copies).collect()
@@ -25,7 +23,7 @@ pub(super) fn warnings(measurement: &Measurement, options: &FitOptions, valid: O
 /// Says how many valid values weights by σ leave out for want of one.
 fn exact(measurement: &Measurement, options: &FitOptions) -> Option<String> {
     let sigma = measurement.sigma.as_ref().filter(|_| options.use_sigma)?;
-    let least_cos = options.max_angle_deg.to_radians().cos() - INCLUSIVE;
+    let least_cos = least_cos(options);
     let (entries, channels) = (measurement.len(), measurement.channels.len());
     let of_entry = |(without, all): (usize, usize), entry: usize| {
         let valid = (0..channels).map(|c| c * entries + entry).filter(|&i| !measurement.values[i].is_nan());
@@ -57,7 +55,7 @@ fn is_dark(plane: &[f64]) -> bool {
 
 /// Values missing, and values in all, of the entries within the angular limit that the stride takes.
 fn count(measurement: &Measurement, options: &FitOptions, valid: Option<usize>) -> (usize, usize) {
-    let least_cos = options.max_angle_deg.to_radians().cos() - INCLUSIVE;
+    let least_cos = least_cos(options);
     let blocks = match measurement.directions {
         Directions::Merl(grid) if options.stride == 1 => of_grid(measurement, grid, least_cos, valid),
         _ => of_list(measurement, options.stride, least_cos),
@@ -127,7 +125,7 @@ mod tests {
         let grid = MerlGrid::default();
         let values: Vec<f64> = (0..MerlGrid::LEN).map(|i| if i % 7 == 3 { f64::NAN } else { 1.0 }).collect();
         let table = Measurement::new("t", Directions::Merl(grid), vec!["r".into()], values);
-        let least_cos = 70f64.to_radians().cos() - INCLUSIVE;
+        let least_cos = least_cos(&FitOptions { max_angle_deg: 70.0, ..options(1) });
         let sum = |blocks: Vec<(usize, usize)>| blocks.iter().fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         let want = sum(of_list(&table, 1, least_cos));
         assert_eq!(sum(of_grid(&table, grid, least_cos, None)), want);

@@ -112,7 +112,7 @@ fn fit_parts(
     all: &[usize],
     clock: Instant,
 ) -> Result<Vec<part::Part>, FitError> {
-    let groups: Vec<&[usize]> = if options.per_channel { all.chunks(1).collect() } else { vec![all] };
+    let groups = options.groups(all);
     let mut found = Vec::new();
     for (done, group) in groups.iter().enumerate() {
         let time = options.time_budget.map(|budget| budget::share(budget, clock.elapsed(), groups.len() - done));

@@ -35,7 +35,7 @@ pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<Offset> {
         return None;
     }
     let channels = at.weights.len();
-    let parameters = channels * problem.kinds.len() + problem.layout.len();
+    let parameters = problem.parameters();
     let zero =
         Sums { follow: vec![(0.0, 0.0); parameters], mean: vec![[(0.0, 0.0); 2]; channels * problem.kinds.len()] };
     let parts = samples.map_pieces(

@@ -126,6 +126,11 @@ impl FitOptions {
         Ok(())
     }
 
+    /// Channels fitted together, of those given.
+    pub(super) fn groups<'a>(&self, channels: &'a [usize]) -> Vec<&'a [usize]> {
+        if self.per_channel { channels.chunks(1).collect() } else { vec![channels] }
+    }
+
     /// The model in the measurement's world: a flat table is fitted by the flat twins of the lobes.
     pub(super) fn model_for(&self, measurement: &Measurement) -> Result<ModelSpec, FitError> {
         match (measurement.dimension, self.model.is_flat()) {

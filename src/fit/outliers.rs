@@ -4,10 +4,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::spread_into;
 use super::loss::Robust;
-use super::passes::{Projected, Scratch};
-use crate::numeric::simd::vectorised;
+use super::passes::{Scratch, project};
+use super::reduced::spread_into;
 
 /// Pulls of gross outliers, of one channel's bare columns or of all parameters.
 #[derive(Clone)]
@@ -34,7 +33,7 @@ impl Outliers {
             return;
         }
         self.count += found;
-        vectorised(Projected { columns: &scratch.columns, on: &pulls, into: self.pull.as_mut_slice() });
+        project(&scratch.columns, &pulls, &mut self.pull);
         scratch.weight = pulls.iter().map(|p| p * p).collect();
         scratch.tally(self.pull.len(), &mut self.pull.map(|_| 0.0), &mut self.squares);
     }

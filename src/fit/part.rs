@@ -305,7 +305,7 @@ fn finish(
     let independent = residuals as f64 / uncertainty.design_effect;
     let structure = structure::structure(rmse, stated, &uncertainty.neighbours, residuals, independent);
     let structure = structure.filter(|_| rmse > ROUNDING);
-    let capped = (0..solution.weights.len()).map(|c| problem.feasible(c).free_at(&solution.weights[c]).1).collect();
+    let capped = solution.weights.iter().enumerate().map(|(c, x)| problem.is_capped(c, x)).collect();
     let weights = solution.weights.len() * problem.kinds.len();
     let at_end: Vec<bool> = (weights..uncertainty.errors.len())
         .map(|i| intervals::is_at_end(problem, &solution, &uncertainty, i))

@@ -20,7 +20,7 @@ use super::samples::{Block, Samples, Transforms};
 use super::tally::Tallied;
 use super::transform::Transform;
 use crate::brdf::LobeKind;
-use crate::numeric::simd::{Kernel, Simd, dot, dot_vectorised, vectorised};
+use crate::numeric::simd::{Kernel, Simd, dot_vectorised, vectorised};
 
 /// A lobe of the model at given shapes (natural units).
 #[derive(Debug, Clone)]
@@ -312,8 +312,7 @@ pub(super) fn sums(
                     }
                     scratch.tally(columns, &mut sums.gradient, &mut sums.normal);
                 } else {
-                    let (columns, on) = (&scratch.columns[..columns], &scratch.pull[..]);
-                    vectorised(Projected { columns, on, into: sums.gradient.as_mut_slice() });
+                    project(&scratch.columns[..columns], &scratch.pull, &mut sums.gradient);
                 }
             }
         };
@@ -331,18 +330,7 @@ pub(super) fn sums(
     total
 }
 
-/// Σ list·col of every column.
-pub(super) struct Projected<'a> {
-    pub columns: &'a [Vec<f64>],
-    pub on: &'a [f64],
-    pub into: &'a mut [f64],
-}
-
-impl Kernel for Projected<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _simd: S) {
-        self.into.iter_mut().zip(self.columns).for_each(|(to, column)| *to += dot(self.on, column));
-    }
+/// Adds Σ list·col of every column.
+pub(super) fn project(columns: &[Vec<f64>], list: &[f64], into: &mut DVector<f64>) {
+    into.iter_mut().zip(columns).for_each(|(to, column)| *to += dot_vectorised(list, column));
 }

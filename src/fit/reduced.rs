@@ -33,6 +33,15 @@ pub(super) struct Problem<'a> {
     pub saturation: Saturation,
 }
 
+/// Adds a channel's matrix of bare columns, its lower triangle, to one of all parameters: columns count `strength` times and stand at `place`.
+pub(super) fn spread_into(to: &mut DMatrix<f64>, bare: &DMatrix<f64>, strength: &[f64], place: &[usize]) {
+    for (i, &a) in place.iter().enumerate() {
+        for (j, &b) in place.iter().enumerate() {
+            to[(a, b)] += strength[i] * strength[j] * bare[(i.max(j), i.min(j))];
+        }
+    }
+}
+
 /// A point of the problem with everything that goes with it.
 #[derive(Debug, Clone)]
 pub(super) struct Solution {
@@ -121,6 +130,16 @@ impl<'a> Problem<'a> {
 
     pub fn feasible(&self, channel: usize) -> Feasible<'_> {
         Feasible { ranges: &self.ranges[channel], cap: self.cap }
+    }
+
+    /// Number of parameters: the weights of every channel and all shapes.
+    pub fn parameters(&self) -> usize {
+        self.ranges.len() * self.kinds.len() + self.layout.len()
+    }
+
+    /// Whether the energy limit decides the weights of a channel.
+    pub fn is_capped(&self, channel: usize, x: &DVector<f64>) -> bool {
+        self.feasible(channel).free_at(x).1
     }
 
     /// Weights of a channel as they may be: in their ranges, and each less by its part of what their sum is above the cap.

@@ -184,6 +184,7 @@ mod tests {
         assert!((c.model / 0.125f64.sqrt() - 1.0).abs() < 0.02, "{c:?}");
         assert!(structure(1.0, None, &Neighbours::default(), 5, 5.0).is_none());
     }
+
     /// A row of a table, so many vectors long and one more.
     const VECTORS: usize = 3;
     const ROW: usize = VECTORS * LANES + 1;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::passes::Scratch;
-use crate::numeric::simd::{Eight, Kernel, LANES, Lanes, Simd, dot, dot3, vectorised};
+use crate::numeric::simd::{Eight, Kernel, LANES, Lanes, Simd, dot, dot_vectorised, dot3, vectorised};
 
 impl Scratch {
     /// Adds Σ pull·col and the lower triangle of Σ weight·col·col.
@@ -36,8 +36,8 @@ impl Tallied {
     /// Adds the columns that it has room for.
     pub fn add(&mut self, scratch: &Scratch) {
         if self.products.is_empty() {
-            let columns = &scratch.columns[..self.gradient.len()];
-            return vectorised(Pulls { columns, pull: &scratch.pull, into: &mut self.gradient });
+            let sums = self.gradient.iter_mut().zip(&scratch.columns);
+            return sums.for_each(|(to, column)| to[0] += dot_vectorised(&scratch.pull, column));
         }
         let (list, pull, weight) = (&scratch.columns[..self.gradient.len()], &scratch.pull[..], &scratch.weight[..]);
         match list.len() {
@@ -122,22 +122,6 @@ impl<S: Simd, const K: usize> RunningSums<S, K> {
                 }
             }
         }
-    }
-}
-
-/// Σ pull·col alone.
-struct Pulls<'a> {
-    columns: &'a [Vec<f64>],
-    pull: &'a [f64],
-    into: &'a mut [Eight],
-}
-
-impl Kernel for Pulls<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _simd: S) {
-        self.into.iter_mut().zip(self.columns).for_each(|(to, column)| to[0] += dot(self.pull, column));
     }
 }
 

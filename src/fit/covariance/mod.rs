@@ -16,7 +16,7 @@ use super::structure::Neighbours;
 use crate::numeric::stats::student_quantile;
 use sandwich::Sandwich;
 use sums::Totals;
-pub(super) use sums::{spread_into, stated_errors};
+pub(super) use sums::{data_slopes, stated_errors};
 
 /// A 95 % interval.
 pub type Interval = (f64, f64);
@@ -123,7 +123,7 @@ pub(super) fn uncertainty(
 fn limited(problem: &Problem<'_>, at: &Solution, pinned: &[bool]) -> Vec<Vec<usize>> {
     let of = |(c, x): (usize, &DVector<f64>)| {
         let own: Vec<usize> = (c * x.len()..(c + 1) * x.len()).filter(|&i| !pinned[i]).collect();
-        (problem.feasible(c).free_at(x).1 && own.len() > 1).then_some(own)
+        (problem.is_capped(c, x) && own.len() > 1).then_some(own)
     };
     at.weights.iter().enumerate().filter_map(of).collect()
 }

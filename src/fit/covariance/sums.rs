@@ -2,16 +2,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::super::folded::{OnLines, Products, Residuals};
-use super::super::loss::{Datum, Robust};
-use super::super::merl_lines::{Line, MerlLines};
-use super::super::outliers::{self, Outliers};
-use super::super::passes::{Moments, Projected, Scratch};
-use super::super::reduced::{Problem, Solution};
-use super::super::samples::Block;
-use super::super::structure::Neighbours;
-use super::super::tally::Tallied;
-use crate::numeric::simd::{Kernel, Simd, dot_vectorised, vectorised};
+use crate::fit::folded::{OnLines, Products, Residuals};
+use crate::fit::loss::{Datum, Robust};
+use crate::fit::merl_lines::{Line, MerlLines};
+use crate::fit::outliers::{self, Outliers};
+use crate::fit::passes::{Moments, Scratch, project};
+use crate::fit::reduced::{Problem, Solution, spread_into};
+use crate::fit::samples::Block;
+use crate::fit::structure::Neighbours;
+use crate::fit::tally::Tallied;
+use crate::numeric::simd::dot_vectorised;
 
 /// The sums over all samples, by all parameters.
 pub(super) struct Totals {
@@ -35,7 +35,7 @@ pub(super) struct Totals {
 
 impl Totals {
     fn new(problem: &Problem<'_>, channels: usize) -> Self {
-        let parameters = channels * problem.kinds.len() + problem.layout.len();
+        let parameters = problem.parameters();
         let zero = DMatrix::zeros(parameters, parameters);
         Self {
             cost: 0.0,
@@ -70,11 +70,10 @@ impl Totals {
                 totals.add(problem, at, c, sums);
             }
         }
+        let Some(moments) = moments else { return totals };
         for (c, x) in at.weights.iter().enumerate() {
-            let (strength, place) = (problem.strength(x), problem.place(at.weights.len(), c));
-            if let Some(moments) = moments {
-                spread_into(&mut totals.normal, moments.gram(c), &strength, &place);
-            }
+            let place = problem.place(at.weights.len(), c);
+            spread_into(&mut totals.normal, moments.gram(c), &problem.strength(x), &place);
         }
         totals
     }
@@ -96,15 +95,6 @@ impl Totals {
         self.stated = (self.stated.0 + sums.stated.0, self.stated.1 + sums.stated.1);
         self.neighbours.add(&sums.neighbours);
         self.dark[channel] |= sums.dark;
-    }
-}
-
-/// Adds a channel's matrix of bare columns, its lower triangle, to one of all parameters: columns count `strength` times and stand at `place`.
-pub(in crate::fit) fn spread_into(to: &mut DMatrix<f64>, bare: &DMatrix<f64>, strength: &[f64], place: &[usize]) {
-    for (i, &a) in place.iter().enumerate() {
-        for (j, &b) in place.iter().enumerate() {
-            to[(a, b)] += strength[i] * strength[j] * bare[(i.max(j), i.min(j))];
-        }
     }
 }
 
@@ -142,7 +132,7 @@ struct Piece {
 impl Piece {
     fn new(problem: &Problem<'_>, at: &Solution) -> Self {
         let (channels, k) = (at.weights.len(), problem.kinds.len() + problem.layout.len());
-        let parameters = channels * problem.kinds.len() + problem.layout.len();
+        let parameters = problem.parameters();
         let sums = ChannelSums {
             cost: 0.0,
             normal: DMatrix::zeros(k, k),
@@ -172,7 +162,7 @@ impl Piece {
             sums.cost += scratch.residuals(problem.samples, block, c, x, problem.saturation);
             let (w, pairs) = (block.weight(c), &block.pairs);
             sums.neighbours.add(&Neighbours::of(&scratch.r, &scratch.trust, w, pairs));
-            sums.dark |= vectorised(Dark(&block.x, w)) > 0.0;
+            sums.dark |= block.x.iter().zip(w).any(|(x, w)| *x == f64::NEG_INFINITY && *w > 0.0);
             let gradient = sums.add(problem, block, c, scratch, bread);
             sums.outliers.add(scratch, gross);
             let (strength, place) = (problem.strength(x), problem.place(channels, c));
@@ -226,26 +216,6 @@ impl Piece {
     }
 }
 
-/// Σ w where the lobes with a shape are 0.
-struct Dark<'a>(&'a [f64], &'a [f64]);
-
-impl Kernel for Dark<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _simd: S) -> f64 {
-        let ((x8, rest_x), (w8, rest_w)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
-        let mut lanes = [0.0f64; 8];
-        let dark = |x: f64, w: f64| if x == f64::NEG_INFINITY { w } else { 0.0 };
-        for (x, w) in x8.iter().zip(w8) {
-            for k in 0..8 {
-                lanes[k] += dark(x[k], w[k]);
-            }
-        }
-        lanes.iter().sum::<f64>() + rest_x.iter().zip(rest_w).map(|(x, w)| dark(*x, *w)).sum::<f64>()
-    }
-}
-
 impl ChannelSums {
     /// Adds A, B and the g_k over a block, of the bare columns, and returns Σ pull·col. v is σ_r² where σ is known, else r²; under a robust loss
     /// always the latter, for a stated σ says nothing of outliers.
@@ -273,7 +243,7 @@ impl ChannelSums {
         }
         let data_slopes = data_slopes(problem, block, channel, &scratch.f);
         scratch.squared_pull();
-        let known = stated_errors(problem, block, channel, &scratch.f);
+        let known = stated_errors(problem, block, channel, &data_slopes);
         if !known.is_empty() {
             for (s, w) in known.iter().zip(w) {
                 self.stated.0 += s.map_or(0.0, |s| w * s * s);
@@ -300,22 +270,22 @@ impl ChannelSums {
                 if w[i] > 0.0 && shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * shift } else { 0.0 }
             };
             let moved: Vec<f64> = (0..block.len()).map(moved).collect();
-            vectorised(Projected { columns: &scratch.columns, on: &moved, into: total.as_mut_slice() });
+            project(&scratch.columns, &moved, total);
         }
         gradient
     }
 }
 
-/// σ_r of every value of a block that states its σ; empty where the measurement states none.
+/// σ_r of every value of a block that states its σ, by the [`data_slopes`]; empty where the measurement states none.
 pub(in crate::fit) fn stated_errors(
     problem: &Problem<'_>,
     block: &Block,
     channel: usize,
-    f: &[f64],
+    slopes: &[f64],
 ) -> Vec<Option<f64>> {
     let samples = problem.samples;
     let Some(sigma) = samples.measurement.sigma_plane(samples.channels[channel]) else { return Vec::new() };
-    let (slopes, w) = (data_slopes(problem, block, channel, f), block.weight(channel));
+    let w = block.weight(channel);
     let of = |i: usize| {
         let s = slopes[i].abs() * sigma[block.index[i] as usize];
         (s.is_finite() && s > 0.0 && w[i] > 0.0).then_some(s)
@@ -324,7 +294,7 @@ pub(in crate::fit) fn stated_errors(
 }
 
 /// ∂r/∂y in the fit's scale, for errors in the data's own unit; empty where the measurement states none.
-fn data_slopes(problem: &Problem<'_>, block: &Block, channel: usize, f: &[f64]) -> Vec<f64> {
+pub(in crate::fit) fn data_slopes(problem: &Problem<'_>, block: &Block, channel: usize, f: &[f64]) -> Vec<f64> {
     let samples = problem.samples;
     if samples.measurement.sigma.is_none() && samples.measurement.common.is_empty() {
         return Vec::new();

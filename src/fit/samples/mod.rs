@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 pub(in crate::fit) use block::Block;
 use block::Values;
-pub(in crate::fit) use select::{Thin, offset};
+pub(in crate::fit) use select::{Thin, least_cos, offset};
 
 use super::loss::Loss;
 use super::merl_lines::{self, Line, MerlLines};

@@ -12,7 +12,8 @@ use crate::measurement::Measurement;
 /// Slack in the cosine that makes the angular limit inclusive whatever the rounding of the direction.
 const INCLUSIVE: f64 = 1e-12;
 
-pub(super) fn least_cos(options: &FitOptions) -> f64 {
+/// Cosine of the angular limit, with that slack.
+pub(in crate::fit) fn least_cos(options: &FitOptions) -> f64 {
     options.max_angle_deg.to_radians().cos() - INCLUSIVE
 }
 

@@ -141,3 +141,16 @@ pub fn minimize<O: Linearize>(
     let here = here.ok_or_else(|| Error::msg("the solver lost its point"))?;
     Ok(Outcome { parameters: here.p, cost: here.at.cost, stop: stop.unwrap_or(Stop::MaxIterations), history })
 }
+
+/// The least cost within bounds, searched from the point of the box that is nearest to `from`; not to its last digits. `None` where the problem
+/// can't be evaluated.
+pub(super) fn least_cost<O: Linearize>(problem: O, bounds: &[(f64, f64)], from: &[f64]) -> Option<f64> {
+    let options = SolverOptions { ftol: 1e-10, polish: 0, ..SolverOptions::default() };
+    let lm = LevenbergMarquardt::new(options).with_bounds(bounds.to_vec());
+    let start = from.iter().zip(bounds).map(|(t, (low, high))| t.clamp(*low, *high));
+    let start = DVector::from_iterator(from.len(), start);
+    minimize(problem, lm, start, LEAST_COST_STEPS).ok().map(|found| found.cost)
+}
+
+/// Steps that [`least_cost`] takes at most.
+const LEAST_COST_STEPS: u64 = 30;
