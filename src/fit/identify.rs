@@ -1,6 +1,7 @@
 //! What the data leave open although the cost curves where the search ended: other ends of the range that are as good.
 
 use super::covariance::{Uncertainty, pinned};
+use super::passes::Scratch;
 use super::reduced::{Problem, Search, Solution};
 use super::solver;
 use super::streamed::Streamed;
@@ -19,7 +20,7 @@ pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &mut Un
         solver::least_cost(search.walk(), &held.bounds, &at.t).unwrap_or(f64::INFINITY)
     };
     let least = search.solve(&at.t).cost.max(0.0);
-    mark(search.problem, at, uncertainty, least, resolved, cost);
+    mark(search.problem, at, uncertainty, &Least { cost: least, noise: least, resolved }, cost);
 }
 
 /// Marks what the data leave open, by passes over `part`, the same problem on few samples.
@@ -29,7 +30,36 @@ pub(super) fn by_passes(part: &Problem<'_>, at: &Solution, uncertainty: &mut Unc
         solver::least_cost(&streamed, &held.bounds, &at.t).unwrap_or(f64::INFINITY)
     };
     let least = cost(part);
-    mark(part, at, uncertainty, least, RESOLVED * least, cost);
+    let noise = if part.saturation.is_some() { bounded_noise(part, at) } else { least };
+    mark(part, at, uncertainty, &Least { cost: least, noise, resolved: RESOLVED * least }, cost);
+}
+
+/// The cost where the search ended.
+struct Least {
+    cost: f64,
+    /// As much of it as is noise: without what gross outliers add, which no shape changes.
+    noise: f64,
+    /// What of it can be told.
+    resolved: f64,
+}
+
+/// Σ w ψ² Σ w / Σ w ψ′, ψ = ρ′ r: what the cost would be if the pulls were residuals, each as steep as they are on the average.
+fn bounded_noise(problem: &Problem<'_>, at: &Solution) -> f64 {
+    let Some((kind, s)) = problem.saturation else { return 0.0 };
+    let start = || ([0.0; 3], Scratch::default());
+    let pieces = problem.samples.map_pieces(start, |(sums, scratch), block| {
+        scratch.basis(&block.x, &at.lobes);
+        for (c, x) in at.weights.iter().enumerate() {
+            scratch.residuals(problem.samples, block, c, x, problem.saturation);
+            for ((w, r), trust) in block.weight(c).iter().zip(&scratch.r).zip(&scratch.trust) {
+                sums[0] += w * (trust * r).powi(2);
+                sums[1] += w;
+                sums[2] += w * kind.rho((r / s).powi(2)).2;
+            }
+        }
+    });
+    let [squares, weight, growth] = pieces.iter().fold([0.0; 3], |sum, (own, _)| [0, 1, 2].map(|i| sum[i] + own[i]));
+    squares * weight / growth.max(0.0)
 }
 
 /// A shape that may as well stand at an end of its range is open, and so is what can't be told apart there: at n → 0 a Phong lobe is the diffuse
@@ -38,15 +68,14 @@ fn mark(
     problem: &Problem<'_>,
     at: &Solution,
     uncertainty: &mut Uncertainty,
-    least: f64,
-    resolved: f64,
+    least: &Least,
     cost: impl Fn(&Problem<'_>) -> f64,
 ) {
     let (channels, lobes) = (at.weights.len(), problem.kinds.len());
     let freedom = problem.samples.residuals() as f64 - uncertainty.errors.len() as f64;
     // A lobe brings a weight a channel and a shape; the factor is for noise that is not the same everywhere.
-    let rise = 1.5 * chi_square_quantile(0.95, channels as f64 + 1.0) * least / freedom.max(1.0) + resolved;
-    let as_good = |i: usize, end: f64| cost(&problem.holding(channels * lobes + i, end)) <= least + rise;
+    let rise = 1.5 * chi_square_quantile(0.95, channels as f64 + 1.0) * least.noise / freedom.max(1.0) + least.resolved;
+    let as_good = |i: usize, end: f64| cost(&problem.holding(channels * lobes + i, end)) <= least.cost + rise;
     // A lobe whose weights may all be 0 may stand anywhere.
     let unproved = |lobe: usize| {
         let may_be_0 = |c: usize| {

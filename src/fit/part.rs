@@ -202,13 +202,19 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     let mut solution = Streamed::new(&problem).solve(found.outcome.parameters.as_slice());
     let mut met = true;
     if options.robust.is_some() {
-        (solution, met) = robust::settle(&mut problem, (&few, &more), solution, options)?;
-        found.report = start::SearchReport::default();
+        (solution, met, found.report) = robust::settle(&mut problem, (&few, &more), solution, options)?;
     }
     let mut judged = judge(&problem, &more, &solution, options)?;
     for _ in 0..VALLEYS {
         let Some(lower) = judged.lower.take() else { break };
-        (solution, met) = robust::resettle(&mut problem, lower, options)?;
+        let before = problem.saturation;
+        let (resettled, has_met) = robust::resettle(&mut problem, lower, options)?;
+        if robust::grows(before, problem.saturation) {
+            // Lower at the s of the one it left, but of a larger s of its own: the smallest s decides, as among the starts.
+            problem.saturation = before;
+            break;
+        }
+        (solution, met) = (resettled, has_met);
         judged = judge(&problem, &more, &solution, options)?;
     }
     let unsettled = if met { None } else { robust::left(&problem, &judged.solution, options) };

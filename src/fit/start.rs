@@ -229,6 +229,12 @@ pub(super) fn extended(problem: &Problem<'_>, smaller: &[f64], cost: impl Fn(&[f
     tried.min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| smaller.to_vec(), |(_, t)| t)
 }
 
+/// The nodes of the last shape; of a model without shapes one, which has none.
+pub(super) fn last_nodes(problem: &Problem<'_>) -> Vec<Option<f64>> {
+    let nodes = Nodes::new(problem);
+    nodes.of.last().map_or_else(|| vec![None], |own| own.iter().map(|&k| Some(nodes.t[k])).collect())
+}
+
 /// Shapes drawn evenly on the logarithmic scale.
 fn drawn(problem: &Problem<'_>, count: usize) -> Vec<Vec<f64>> {
     let mut rng = stream(0, Purpose::Study, problem.layout.len() as u64);

@@ -1,10 +1,10 @@
 //! Robust fits: the scale s that they settle at, and what they say where it does not settle.
 
 use goniofit::brdf::Material;
-use goniofit::fit::{Datum, FitOptions, Loss, Robust, RobustKind};
+use goniofit::fit::{Datum, FitOptions, Limit, Loss, Robust, RobustKind};
 use goniofit::geometry::theta_of;
 use goniofit::gonio::{Instrument, Scan};
-use goniofit::measurement::Measurement;
+use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
 use goniofit::numeric::random::RngExt;
 use rayon::prelude::*;
 
@@ -106,8 +106,97 @@ fn a_scale_that_can_not_settle_is_said_to_be_so_with_what_the_residuals_ask_for(
     let said = record(&got).warnings.iter().find(|w| w.starts_with("the robust scale has not settled"));
     let said = said.unwrap_or_else(|| panic!("{:?}", record(&got).warnings));
     println!("{said}");
-    assert!(left > 1e-3 && said.contains(&format!("differs by {:.1e} %", 100.0 * left)), "{left:e}: {said}");
+    assert!(left > 1e-5 && said.contains(&format!("differs by {:.1e} %", 100.0 * left)), "{left:e}: {said}");
     // At the usual scale it settles, and nothing is said.
     let usual = solved(&m, &FitOptions { robust: robust(RobustKind::Cauchy), ..o });
     assert!(!record(&usual).warnings.iter().any(|w| w.contains("settled")), "{:?}", record(&usual).warnings);
+}
+
+const NOISE: f64 = 0.01;
+
+/// In-plane scans at three incidences, 93 readings of a glossy lobe of exponent 30 with noise; a share of them too high by about 100 σ,
+/// by 300 σ where the seed is odd.
+fn leaning(seed: u64, share: f64) -> Measurement {
+    let rng = &mut draws(seed);
+    let towards = |theta: f64| glam::DVec3::new(theta.to_radians().sin(), 0.0, theta.to_radians().cos());
+    let pairs = [-10.0, -40.0, -60.0].into_iter().flat_map(|i| (-15..=15).map(move |o| (i, 5.0 * f64::from(o))));
+    let (wi, wo) = pairs.map(|(i, o)| (towards(i), towards(o))).unzip();
+    let directions = Directions::List { wi, wo };
+    let scan =
+        Scan::List { name: "in plane".into(), directions, weights: Weights::Uniform, dimension: Dimension::Space };
+    let mut m = exact(&material(&[0.2], &[0.1], 30.0), &scan);
+    let size = if seed % 2 == 1 { 3.0 } else { 1.0 };
+    for value in &mut m.values {
+        *value += NOISE * normal(rng);
+        if rng.random::<f64>() < share {
+            *value += size * (1.0 + 0.3 * normal(rng)).abs();
+        }
+    }
+    m
+}
+
+/// A minimum inside a range is one of the whole range too: the search over more may not end in a worse one.
+#[test]
+fn a_free_robust_fit_is_never_worse_than_one_bounded_around_the_truth() {
+    let (low, high) = (5.0, 100.0);
+    let one = |(kind, share, seed): (RobustKind, f64, u64)| {
+        let m = leaning(seed, share);
+        let free = FitOptions { robust: robust(kind), ..options("lambert+phong") };
+        let limit = Limit::range(&format!("phong.exponent={low}..{high}")).expect("a limit");
+        let bounded = FitOptions { limits: vec![limit], ..free.clone() };
+        let [free, bounded] = [free, bounded].map(|o| solved(&m, &o));
+        // At an end of the range it is no minimum of the free fit's.
+        let inside = (1.01 * low..0.99 * high).contains(&exponent(&bounded, 1));
+        let [f, b] = [&free, &bounded].map(|m| (record(m).robust_scale[0], record(m).cost));
+        let (grows, costs) = ((f.0 / b.0).ln(), (f.1 / b.1).ln() - 2.0 * (f.0 / b.0).ln());
+        let worse = grows > ALIKE || grows > -ALIKE && costs > ALIKE;
+        let said = format!(
+            "{kind:?} {share} seed {seed}: {} at {f:?}, {} at {b:?}",
+            exponent(&free, 1),
+            exponent(&bounded, 1)
+        );
+        (inside && worse).then_some(said)
+    };
+    let shares = [0.1, 0.2, 0.3];
+    let kinds = RobustKind::ALL.into_iter().flat_map(|k| shares.map(|share| (k, share)));
+    let cases: Vec<_> = kinds.flat_map(|(k, share)| (0..100).map(move |seed| (k, share, seed))).collect();
+    let worse: Vec<String> = cases.into_par_iter().filter_map(one).collect();
+    assert!(worse.is_empty(), "{} of 600: {worse:#?}", worse.len());
+}
+
+/// Scales that settle this closely on the part of the samples are alike.
+const ALIKE: f64 = 4e-3;
+
+/// The pull of one value, however large, ends at s, and so must what it does to the fit.
+#[test]
+fn one_value_however_large_moves_a_robust_fit_no_further_than_a_large_one() {
+    for kind in RobustKind::ALL {
+        let o = FitOptions { robust: robust(kind), ..options("lambert+phong") };
+        let with = |value: f64| {
+            let mut m = leaning(5, 0.0);
+            m.values[39] = value;
+            solved(&m, &o)
+        };
+        let large = with(1e6);
+        assert!(rel(exponent(&large, 1), 30.0) < 0.2, "{kind:?}: {:?}", parameters(&large));
+        for value in [1e8, 1e12, 1e14, 1e16, 1e20, 1e100] {
+            let got = with(value);
+            let pairs = parameters(&got).into_iter().zip(parameters(&large)).zip(errors(&large));
+            let off = pairs.map(|((a, b), e)| (a - b).abs() / e.expect("an error")).fold(0.0, f64::max);
+            println!("{kind:?} {value:e}: {off:.1e} standard errors off");
+            assert!(off < 0.1, "{kind:?} {value:e}: {:?}, not {:?}", parameters(&got), parameters(&large));
+        }
+    }
+}
+
+#[test]
+fn a_robust_search_says_how_many_starts_ended_where() {
+    for kind in RobustKind::ALL {
+        let o = FitOptions { robust: robust(kind), ..options("lambert+phong") };
+        let got = solved(&leaning(8, 0.2), &o);
+        let search = record(&got).search.as_ref().expect("a search");
+        println!("{kind:?}: {search:?}");
+        assert!(search.starts > 1 && (1..=search.starts).contains(&search.reached), "{search:?}");
+        assert!(search.minima >= 1 && search.reached + search.minima <= search.starts + 1, "{search:?}");
+    }
 }
