@@ -174,9 +174,9 @@ pub struct EnergyRecord {
 /// How the global minimum was looked for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchRecord {
-    /// Starts polished.
+    /// Starts polished; of a robust fit those whose scale was followed.
     pub starts: u64,
-    /// Of them, how many ended in the lowest minimum.
+    /// Of them, how many ended in the lowest minimum; of a robust fit, as well as the best, by scale and cost.
     pub reached: u64,
     /// Distinct minima seen.
     pub minima: u64,

@@ -30,7 +30,7 @@ pub(super) fn by_passes(part: &Problem<'_>, at: &Solution, uncertainty: &mut Unc
         solver::least_cost(&streamed, &held.bounds, &at.t).unwrap_or(f64::INFINITY)
     };
     let least = cost(part);
-    let noise = if part.saturation.is_some() { bounded_noise(part, at) } else { least };
+    let noise = bounded_noise(part, at).unwrap_or(least);
     mark(part, at, uncertainty, &Least { cost: least, noise, resolved: RESOLVED * least }, cost);
 }
 
@@ -43,9 +43,10 @@ struct Least {
     resolved: f64,
 }
 
-/// Σ w ψ² Σ w / Σ w ψ′, ψ = ρ′ r: what the cost would be if the pulls were residuals, each as steep as they are on the average.
-fn bounded_noise(problem: &Problem<'_>, at: &Solution) -> f64 {
-    let Some((kind, s)) = problem.saturation else { return 0.0 };
+/// Σ w ψ² Σ w / Σ w ψ′, ψ = ρ′ r: what the cost would be if the pulls were residuals, each as steep as they are on the average. `None` without a
+/// robust loss, and where the pulls fall as residuals grow, for s is too small for them.
+fn bounded_noise(problem: &Problem<'_>, at: &Solution) -> Option<f64> {
+    let (kind, s) = problem.saturation?;
     let start = || ([0.0; 3], Scratch::default());
     let pieces = problem.samples.map_pieces(start, |(sums, scratch), block| {
         scratch.basis(&block.x, &at.lobes);
@@ -59,7 +60,7 @@ fn bounded_noise(problem: &Problem<'_>, at: &Solution) -> f64 {
         }
     });
     let [squares, weight, growth] = pieces.iter().fold([0.0; 3], |sum, (own, _)| [0, 1, 2].map(|i| sum[i] + own[i]));
-    squares * weight / growth.max(0.0)
+    (growth > 0.0).then(|| squares * weight / growth)
 }
 
 /// A shape that may as well stand at an end of its range is open, and so is what can't be told apart there: at n → 0 a Phong lobe is the diffuse

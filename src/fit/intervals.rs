@@ -63,19 +63,35 @@ pub(super) fn by_passes(
     at: &Solution,
     uncertainty: &Uncertainty,
 ) -> (Intervals, Option<Solution>) {
+    let lower = RefCell::new(None);
+    let intervals = along_trails(problem, at, uncertainty, Some(&lower));
+    (intervals, lower.into_inner())
+}
+
+/// As [`by_passes`], all of them whatever valleys the profiles meet.
+pub(super) fn by_passes_from_here(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
+    along_trails(problem, at, uncertainty, None)
+}
+
+/// The profiles end at a point of a lower valley where that is asked for.
+fn along_trails(
+    problem: &Problem<'_>,
+    at: &Solution,
+    uncertainty: &Uncertainty,
+    lower: Option<&RefCell<Option<Solution>>>,
+) -> Intervals {
     let residuals = problem.samples.residuals();
     let is_large = residuals > SMALL;
     let is_rounding = at.cost <= ROUNDING * ROUNDING * residuals as f64;
     if is_rounding || is_large && (problem.cap.is_some() || !joint::has_few_parameters(problem)) {
-        return (plain(problem, at, uncertainty), None);
+        return plain(problem, at, uncertainty);
     }
     let (tolerance, tries) = if is_large { (CLOSE_LARGE, TRIES_LARGE) } else { (CLOSE, TRIES) };
     let fine = Fineness { resolved: RESOLVED * at.cost, tolerance, tries };
-    let lower = RefCell::new(None);
-    let intervals = profiled(problem, at, uncertainty, fine, |i, rise| {
+    profiled(problem, at, uncertainty, fine, |i, rise| {
         let mut trail = Trail::new(problem, at, &uncertainty.bread, i, 0.1 * tolerance * rise);
-        let lower = &lower;
         Box::new(move |value| {
+            let Some(lower) = lower else { return trail.cost(value) };
             let cost = if lower.borrow().is_some() { f64::NAN } else { trail.cost(value) };
             if cost < at.cost - LOWER * rise {
                 lower.replace(Some(trail.at().clone()));
@@ -83,8 +99,7 @@ pub(super) fn by_passes(
             }
             cost
         })
-    });
-    (intervals, lower.into_inner())
+    })
 }
 
 /// The least cost as a function of one parameter's value.

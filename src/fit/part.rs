@@ -201,17 +201,18 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     let mut found = start::search_plain(&problem, (&few, &more), options.max_iterations)?;
     let mut solution = Streamed::new(&problem).solve(found.outcome.parameters.as_slice());
     let mut met = true;
-    if options.robust.is_some() {
-        (solution, met, found.report) = robust::settle(&mut problem, (&few, &more), solution, options)?;
+    if let Some(robust) = options.robust {
+        (solution, met, found.report) = robust::settle(&mut problem, (&few, &more), solution, robust, options)?;
     }
     let mut judged = judge(&problem, &more, &solution, options)?;
     for _ in 0..VALLEYS {
         let Some(lower) = judged.lower.take() else { break };
         let before = problem.saturation;
         let (resettled, has_met) = robust::resettle(&mut problem, lower, options)?;
-        if robust::grows(before, problem.saturation) {
+        if robust::grows(before, problem.saturation) || met && !has_met {
             // Lower at the s of the one it left, but of a larger s of its own: the smallest s decides, as among the starts.
             problem.saturation = before;
+            judged.intervals = intervals::by_passes_from_here(&problem, &judged.solution, &judged.uncertainty);
             break;
         }
         (solution, met) = (resettled, has_met);

@@ -27,9 +27,9 @@ const SAME: f64 = 1e-9;
 /// How the global minimum was looked for.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SearchReport {
-    /// Starts polished.
+    /// Starts polished; of a robust fit those whose s was followed.
     pub starts: usize,
-    /// Of them, how many ended in the lowest minimum.
+    /// Of them, how many ended in the lowest minimum; of a robust fit, as well as the best.
     pub reached: usize,
     /// Distinct minima seen.
     pub minima: usize,

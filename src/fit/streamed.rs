@@ -15,6 +15,8 @@ use super::solver::{Linearization, Linearize};
 #[derive(Debug)]
 pub(super) struct Streamed<'a> {
     problem: &'a Problem<'a>,
+    /// Weights that are known from elsewhere: where the first point's start.
+    first: Option<Vec<DVector<f64>>>,
     /// The last point solved: where the next one's weights start.
     last: RefCell<Option<Solution>>,
     /// Predicted share of the cost at which the inner iteration ends.
@@ -30,7 +32,7 @@ const FIRST_WEIGHT: f64 = 0.1;
 
 impl<'a> Streamed<'a> {
     pub fn new(problem: &'a Problem<'a>) -> Self {
-        Self { problem, last: RefCell::new(None), tolerance: INNER_TOLERANCE }
+        Self { problem, first: None, last: RefCell::new(None), tolerance: INNER_TOLERANCE }
     }
 
     /// Good enough to tell valleys apart.
@@ -40,7 +42,7 @@ impl<'a> Streamed<'a> {
 
     /// Starting at weights known from elsewhere.
     pub fn starting_at(self, weights: &Solution) -> Self {
-        Self { last: RefCell::new(Some(Solution { t: Vec::new(), ..weights.clone() })), ..self }
+        Self { first: Some(weights.weights.clone()), ..self }
     }
 
     /// The weights that minimise the cost at `t`.
@@ -50,7 +52,7 @@ impl<'a> Streamed<'a> {
             return known.clone();
         }
         let lobes = self.problem.shaped(t);
-        let start = last.map_or_else(|| self.first_weights(), |s| s.weights);
+        let start = last.map(|s| s.weights).or_else(|| self.first.clone()).unwrap_or_else(|| self.first_weights());
         let solution = self.descend(t, lobes, &start);
         *self.last.borrow_mut() = Some(solution.clone());
         solution

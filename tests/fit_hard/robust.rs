@@ -1,7 +1,7 @@
 //! Robust fits: the scale s that they settle at, and what they say where it does not settle.
 
 use goniofit::brdf::Material;
-use goniofit::fit::{Datum, FitOptions, Limit, Loss, Robust, RobustKind};
+use goniofit::fit::{Bootstrap, Datum, FitOptions, Limit, Loss, Robust, RobustKind};
 use goniofit::geometry::theta_of;
 use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
@@ -186,6 +186,98 @@ fn one_value_however_large_moves_a_robust_fit_no_further_than_a_large_one() {
             println!("{kind:?} {value:e}: {off:.1e} standard errors off");
             assert!(off < 0.1, "{kind:?} {value:e}: {:?}, not {:?}", parameters(&got), parameters(&large));
         }
+    }
+}
+
+/// One incidence, whose mirror direction a single reading looks into: a spike there fits it exactly.
+#[test]
+fn one_huge_value_in_a_lone_mirror_direction_is_no_lobe() {
+    let rng = &mut draws(7);
+    let towards = |theta: f64| glam::DVec3::new(theta.to_radians().sin(), 0.0, theta.to_radians().cos());
+    let (wi, wo) = (-15..=15).map(|o| (towards(-40.0), towards(5.0 * f64::from(o)))).unzip();
+    let directions = Directions::List { wi, wo };
+    let weights = Weights::Uniform;
+    let scan = Scan::List { name: "in plane".into(), directions, weights, dimension: Dimension::Space };
+    let mut m = exact(&material(&[0.2], &[0.1], 30.0), &scan);
+    m.values.iter_mut().for_each(|v| *v += NOISE * normal(rng));
+    let peak = (0..m.len()).find(|&i| (m.directions.pair(i).1 - towards(40.0)).length() < 1e-12).expect("a peak");
+    for kind in RobustKind::ALL {
+        let o = FitOptions { robust: robust(kind), ..options("lambert+phong") };
+        for value in [1e6, 1e12, 1e16, 1e30, 1e100] {
+            m.values[peak] = value;
+            let got = solved(&m, &o);
+            println!("{kind:?} {value:e}: n {}", exponent(&got, 1));
+            assert!(rel(exponent(&got, 1), 30.0) < 0.3, "{kind:?} {value:e}: {:?}", parameters(&got));
+        }
+    }
+}
+
+/// A detector that shows no negative readings: of a lobe before a black ground most are 0.
+#[test]
+fn a_lobe_before_a_ground_that_is_clipped_to_0_is_found() {
+    for (seed, n) in (0..20).flat_map(|seed| [30.0, 200.0].map(|n| (seed, n))) {
+        let rng = &mut draws(seed);
+        let mut m = exact(&material(&[0.0], &[0.3], n), &HEMISPHERE(10.0));
+        m.values.iter_mut().for_each(|v| *v = (*v + NOISE * normal(rng)).max(0.0));
+        let zeros = m.values.iter().filter(|v| **v == 0.0).count();
+        for kind in RobustKind::ALL {
+            let got = solved(&m, &FitOptions { robust: robust(kind), ..options("lambert+phong") });
+            let weight = got.lobes[1].weight[0];
+            assert!(
+                rel(weight, 0.3) < 0.1 && rel(exponent(&got, 1), n) < 0.1,
+                "{kind:?} seed {seed}, {zeros} of {} zero: {:?}",
+                m.len(),
+                parameters(&got)
+            );
+        }
+    }
+}
+
+/// Of forty readings twenty-eight are exactly 0: a diffuse fit's residuals ask for no scale at all.
+#[test]
+fn a_scale_of_nothing_settles_at_rounding() {
+    let mut m = exact(&material(&[0.3], &[0.0], 1.0), &Scan::InPlane { step_deg: 20.0 });
+    for (i, v) in m.values.iter_mut().enumerate() {
+        *v = if i % 10 < 7 { 0.0 } else { 0.1 + 0.01 * i as f64 };
+    }
+    for kind in RobustKind::ALL {
+        let got = solved(&m, &FitOptions { robust: robust(kind), loss: Loss::L2, ..options("lambert") });
+        let r = record(&got);
+        println!("{kind:?}: {:?} at {:?}", parameters(&got), r.robust_scale);
+        assert!(!r.warnings.iter().any(|w| w.contains("settled")), "{:?}", r.warnings);
+        assert!((1e-15..1e-11).contains(&r.robust_scale[0]) && got.lobes[0].weight[0].abs() < 1e-10, "{r:?}");
+    }
+}
+
+/// More parameters than are descended in together.
+#[test]
+fn many_channels_of_a_diffuse_surface_keep_their_values() {
+    let rng = &mut draws(3);
+    let directions = Scan::InPlane { step_deg: 30.0 }.directions().expect("small").0;
+    let n = directions.len();
+    let names: Vec<String> = (0..61).map(|c| format!("{}nm", 400 + 5 * c)).collect();
+    let level = |c: usize| (0.9 + 0.001 * c as f64) / std::f64::consts::PI;
+    let values = (0..61 * n).map(|i| level(i / n) * (1.0 + 0.01 * normal(rng))).collect();
+    let m = Measurement::new("white", directions, names, values);
+    for kind in RobustKind::ALL {
+        let got = solved(&m, &FitOptions { robust: robust(kind), loss: Loss::L2, ..options("lambert") });
+        for (c, w) in got.lobes[0].weight.iter().enumerate() {
+            assert!(rel(*w, level(c) * std::f64::consts::PI) < 0.02, "{kind:?} channel {c}: {w}");
+        }
+    }
+}
+
+/// Without a shape to search for, too, what is redrawn is fitted anew.
+#[test]
+fn a_diffuse_fit_s_bootstrap_scatters_by_its_standard_error() {
+    let m = measure(&material(&[0.3], &[0.0], 1.0), &Instrument::default(), &HEMISPHERE(15.0), 4);
+    for (loss, robust) in [(Loss::Log, None), (Loss::CubeRoot, None), (Loss::CosineL2, robust(RobustKind::Huber))] {
+        let bootstrap = Some(Bootstrap { replicates: 200, seed: 5 });
+        let got = solved(&m, &FitOptions { loss, robust, bootstrap, ..options("lambert") });
+        let redrawn = record(&got).bootstrap.as_ref().expect("a bootstrap").standard_error[0].weight[0];
+        let (redrawn, stated) = (redrawn.expect("an error"), errors(&got)[0].expect("an error"));
+        println!("{loss:?} {robust:?}: {redrawn:e}, {stated:e}");
+        assert!(rel(redrawn, stated) < 0.3, "{loss:?} {robust:?}: {redrawn:e}, {stated:e}");
     }
 }
 

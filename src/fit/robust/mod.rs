@@ -1,0 +1,152 @@
+//! Robust losses: the scale s and the parameters that go with it.
+//!
+//! s is a multiple of the residuals' own spread, which depends on the parameters, which depend on s. The way in is from above: the
+//! plain fit's spread is too large where outliers pull it; as they let go it shrinks, and the parameters follow. There may be several such
+//! pairs, and outliers may hide the right one from the plain fit: so there are other ways in ([`starts`]). Of the pairs found on a part of the
+//! samples one of the smallest s ([`candidate`]) is followed on all.
+
+mod candidate;
+mod spread;
+mod starts;
+mod way;
+
+use super::joint::Digits;
+use super::loss::Robust;
+use super::options::{FitError, FitOptions};
+use super::part::{SMALL, descend};
+use super::passes::Saturation;
+use super::reduced::{Problem, Solution};
+use super::start::SearchReport;
+use candidate::{ALIKE, Candidate};
+use spread::Spread;
+use way::Way;
+
+/// Rounds in which s settles at most.
+const ROUNDS: usize = 60;
+/// Relative change beyond which s counts as not settled where the rounds ran out: far below what the parameters' errors tell apart.
+const UNSETTLED: f64 = 1e-6;
+
+/// How closely s is followed.
+#[derive(Clone, Copy)]
+struct Aim {
+    /// Relative change at which it has settled.
+    tolerance: f64,
+    /// What the descents are good to.
+    digits: Digits,
+}
+
+/// On small tables; on others, where each round takes passes and the parameters' own errors are far larger; on the part of the samples that
+/// says where to begin.
+const CLOSELY: Aim = Aim { tolerance: 1e-12, digits: Digits::All };
+const LARGE: Aim = Aim { tolerance: 1e-7, digits: Digits::Rough };
+const ROUGHLY: Aim = Aim { tolerance: 1e-3, digits: Digits::Rough };
+
+/// The parameters at the s that their residuals ask for, starting from the plain loss's fit and from elsewhere, whether the two met, and how
+/// they were looked for; sets the problem's s. `few` and `more` are the same problem on parts of the samples, which say where to begin.
+pub(super) fn settle(
+    problem: &mut Problem<'_>,
+    (few, more): (&Problem<'_>, &Problem<'_>),
+    plain: Solution,
+    robust: Robust,
+    options: &FitOptions,
+) -> Result<(Solution, bool, SearchReport), FitError> {
+    let settling = Settling::new(problem, &plain, robust, options);
+    let (begun, report) = settling.begin(few, more, plain)?;
+    problem.saturation = begun.saturation;
+    let (at, met) = settling.follow(problem, begun.at, aim(problem))?;
+    Ok((at, met, report))
+}
+
+/// As [`settle`], from a point and an s near the answer's; the point alone where the loss is not robust.
+pub(super) fn resettle(
+    problem: &mut Problem<'_>,
+    near: Solution,
+    options: &FitOptions,
+) -> Result<(Solution, bool), FitError> {
+    let Some(robust) = options.robust else { return Ok((near, true)) };
+    let settling = Settling::new(problem, &near, robust, options);
+    let at = descend(problem, &near, options.max_iterations, Digits::Rough)?.0;
+    settling.follow(problem, at, aim(problem))
+}
+
+/// Whether one s is clearly larger than another.
+pub(super) fn grows(from: Saturation, to: Saturation) -> bool {
+    from.zip(to).is_some_and(|((_, from), (_, to))| (to / from).ln() > ALIKE)
+}
+
+/// ln(the s that the residuals ask for / the problem's s), where that is worth a word.
+pub(super) fn left(problem: &Problem<'_>, at: &Solution, options: &FitOptions) -> Option<f64> {
+    let (robust, (_, s)) = options.robust.zip(problem.saturation)?;
+    let left = (Settling::new(problem, at, robust, options).asked(problem, at) / s).ln();
+    Some(left).filter(|left| left.abs() > UNSETTLED)
+}
+
+/// How closely s is followed on all samples.
+fn aim(problem: &Problem<'_>) -> Aim {
+    if problem.samples.residuals() <= SMALL { CLOSELY } else { LARGE }
+}
+
+/// How s is looked for.
+#[derive(Clone, Copy)]
+struct Settling {
+    robust: Robust,
+    /// Most steps of a descent.
+    steps: u64,
+    /// A spread below this is rounding.
+    rounding: f64,
+}
+
+impl Settling {
+    fn new(problem: &Problem<'_>, like: &Solution, robust: Robust, options: &FitOptions) -> Self {
+        Self { robust, steps: options.max_iterations, rounding: spread::rounding(problem, like) }
+    }
+
+    /// Follows s roughly.
+    fn candidate(&self, problem: &Problem<'_>, saturation: Saturation, at: Solution) -> Result<Candidate, FitError> {
+        let mut problem = problem.on(problem.samples);
+        problem.saturation = saturation;
+        let (at, met) = self.follow(&mut problem, at, ROUGHLY)?;
+        Ok(self.judged(&problem, at, met))
+    }
+
+    /// A point of a problem with its s, to be compared.
+    fn judged(&self, problem: &Problem<'_>, at: Solution, met: bool) -> Candidate {
+        let s = problem.saturation.map_or(1.0, |(_, s)| s);
+        let rank = self.robust.scale * Spread::new(problem, &at).telling.max(self.rounding);
+        // What rounding leaves of the cost tells nothing.
+        let least = problem.samples.residuals() as f64 * (self.rounding / s).powi(2);
+        let height = (at.cost / (s * s)).max(least);
+        Candidate { at, saturation: problem.saturation, met, rank, height }
+    }
+
+    /// Brings ln(new s) − ln(old s) to 0 by secants, within the bracket that is known; the parameters follow. Says
+    /// whether it got there within [`ROUNDS`].
+    fn follow(&self, problem: &mut Problem<'_>, start: Solution, aim: Aim) -> Result<(Solution, bool), FitError> {
+        let mut at = start;
+        let mut s = problem.saturation.map_or(1.0, |(_, s)| s);
+        let mut way = Way::default();
+        for _ in 0..ROUNDS {
+            let excess = (self.asked(problem, &at) / s).ln();
+            if excess.abs() > aim.tolerance {
+                s = way.next(s.ln(), excess).exp();
+                problem.saturation = Some((self.robust.kind, s));
+                at = descend(problem, &at, self.steps, aim.digits)?.0;
+                continue;
+            }
+            if !matches!(aim.digits, Digits::All) {
+                return Ok((at, true));
+            }
+            // A descent may have ended short of the minimum, along a flat way: the s must hold at the end of the next one too.
+            at = descend(problem, &at, self.steps, aim.digits)?.0;
+            if (self.asked(problem, &at) / s).ln().abs() <= UNSETTLED {
+                return Ok((at, true));
+            }
+        }
+        Ok((at, false))
+    }
+
+    /// The s that the residuals ask for.
+    fn asked(&self, problem: &Problem<'_>, at: &Solution) -> f64 {
+        self.robust.scale * Spread::new(problem, at).all.max(self.rounding)
+    }
+}
