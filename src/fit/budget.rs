@@ -62,7 +62,8 @@ pub(super) fn fit(
             thin = next(thin).0; // what counts may be among the others
             continue;
         }
-        let (samples, transforms) = gathered?;
+        let (mut samples, transforms) = gathered?;
+        samples.are_drawn = thin > 1;
         let mut part = part::fit(&samples, transforms, model, ranges, options)?;
         let round = began.elapsed();
         let listed = bootstrap::listed(&samples, options);

@@ -86,7 +86,8 @@ fn along_trails(
     if is_rounding || is_large && (problem.cap.is_some() || !joint::has_few_parameters(problem)) {
         return plain(problem, at, uncertainty);
     }
-    let (tolerance, tries) = if is_large { (CLOSE_LARGE, TRIES_LARGE) } else { (CLOSE, TRIES) };
+    let (tolerance, tries) =
+        if problem.samples.want_last_digits() { (CLOSE, TRIES) } else { (CLOSE_LARGE, TRIES_LARGE) };
     let fine = Fineness { resolved: RESOLVED * at.cost, tolerance, tries };
     profiled(problem, at, uncertainty, fine, |i, rise| {
         let mut trail = Trail::new(problem, at, &uncertainty.bread, i, 0.1 * tolerance * rise);

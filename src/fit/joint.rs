@@ -52,7 +52,7 @@ pub(super) fn polish(
     {
         return None;
     }
-    let dense = !only_cost && problem.samples.residuals() * parameters <= LARGEST;
+    let dense = !only_cost && !problem.samples.are_drawn && problem.samples.residuals() * parameters <= LARGEST;
     let joint = Joint { problem, dense };
     let ranges = problem.ranges.iter().flatten().chain(&problem.bounds).copied().collect();
     let (ftol, polish) = match digits {

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::joint::Digits;
-use super::part::{SMALL, descend};
+use super::part::descend;
 use super::reduced::{Problem, Solution};
 use super::solver::Stop;
 
@@ -48,7 +48,7 @@ impl<'a> Trail<'a> {
     pub fn cost(&mut self, value: f64) -> f64 {
         let held = self.problem.holding(self.parameter, value);
         let start = self.moved(&held, value);
-        let steps = if held.samples.residuals() > SMALL { STEPS_LARGE } else { STEPS };
+        let steps = if held.samples.want_last_digits() { STEPS } else { STEPS_LARGE };
         match descend(&held, &start, steps, self.digits) {
             Ok((found, outcome)) if found.cost.is_finite() && outcome.stop != Stop::MaxIterations => {
                 self.at = found;

@@ -13,7 +13,7 @@ mod way;
 use super::joint::Digits;
 use super::loss::Robust;
 use super::options::{FitError, FitOptions};
-use super::part::{SMALL, descend};
+use super::part::descend;
 use super::passes::Saturation;
 use super::reduced::{Problem, Solution};
 use super::start::SearchReport;
@@ -83,7 +83,7 @@ pub(super) fn left(problem: &Problem<'_>, at: &Solution, options: &FitOptions) -
 
 /// How closely s is followed on all samples.
 fn aim(problem: &Problem<'_>) -> Aim {
-    if problem.samples.residuals() <= SMALL { CLOSELY } else { LARGE }
+    if problem.samples.want_last_digits() { CLOSELY } else { LARGE }
 }
 
 /// How s is looked for.

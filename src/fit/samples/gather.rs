@@ -54,6 +54,7 @@ impl<'a> Samples<'a> {
             epsilon: vec![0.0; channels.len()],
             refused: 0,
             weighting,
+            are_drawn: false,
         };
         let mut transforms = None;
         if let Some(lines) = samples.lines(options, solid_angle).filter(|_| thin.step == 1) {

@@ -17,6 +17,7 @@ pub(in crate::fit) use select::{Thin, least_cos, offset};
 
 use super::loss::Loss;
 use super::merl_lines::{self, Line, MerlLines};
+use super::part::SMALL;
 use super::transform::Transform;
 use crate::measurement::{Directions, Measurement};
 use crate::numeric::simd::vectorised;
@@ -57,6 +58,8 @@ pub(in crate::fit) struct Samples<'a> {
     pub refused: usize,
     /// How the samples were weighted: `solid-angle`, `uniform` or `sigma`.
     pub weighting: &'static str,
+    /// Whether they stand for more of their kind, so that the last digits of a fit to them are nobody's.
+    pub are_drawn: bool,
 }
 
 impl Samples<'_> {
@@ -73,6 +76,11 @@ impl Samples<'_> {
     /// Number of directions that count.
     pub fn len(&self) -> usize {
         self.count
+    }
+
+    /// Whether the last digits are worth many passes.
+    pub fn want_last_digits(&self) -> bool {
+        !self.are_drawn && self.residuals() <= SMALL
     }
 
     /// Residuals in all: samples × channels, masked ones left out.
@@ -274,6 +282,7 @@ impl Samples<'_> {
             epsilon: self.epsilon.clone(),
             refused: self.refused,
             weighting: self.weighting,
+            are_drawn: self.are_drawn,
             source: Source::Listed(all),
         }
     }
