@@ -205,15 +205,15 @@ impl Cell {
             x if x.is_nan() => String::new(),
             x => format!("{:.3} %", 100.0 * x),
         };
-        let seconds = of(|r| r.seconds);
+        let (seconds, excess) = (of(|r| r.seconds), percent(|r| r.excess));
         format!(
-            "{} | {:.0} | {} | {} | {} | {:.1} % | {:.1} ms | {:.2} |",
+            "{} | {:.0} | {} | {} | {} | {} | {:.1} ms | {:.2} |",
             self.name,
             of(|r| r.used),
-            percent(|r| r.excess),
+            excess,
             percent(|r| r.stated),
             percent(|r| r.bound),
-            100.0 * self.held(),
+            if excess.is_empty() { String::new() } else { format!("{:.1} %", 100.0 * self.held()) },
             1e3 * seconds,
             seconds / full
         )

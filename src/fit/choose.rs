@@ -4,10 +4,12 @@ use std::fmt::Write;
 use std::time::{Duration, Instant};
 
 use super::limits::{Limit, Ranges};
+use super::loss::{Robust, RobustKind};
 use super::options::{FitError, FitOptions};
 use super::part;
 use super::passes::{self, Saturation, Want};
 use super::reduced::Solution;
+use super::robust::{JUDGE_SCALE, bounded_cost, sizes};
 use super::samples::{Samples, Thin};
 use super::{Fitted, fit_since};
 use crate::brdf::{ModelCandidate, ModelChoice, ModelSpec};
@@ -187,7 +189,7 @@ fn candidate(
     let is_grid = matches!(measurement.directions, Directions::Merl(_));
     let run = if is_grid { (entries / RUNS).clamp(1, MerlGrid::PHI_D) } else { 1 };
     let thin = Thin { step: measurement.len().div_ceil(entries), run };
-    let (mut cost, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
+    let (mut total, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
     let mut effective = Some(0.0);
     let mut energy = 0.0;
     let (mut own, mut directions) = (Vec::new(), 0);
@@ -198,13 +200,10 @@ fn candidate(
         let whole = part::fit(&samples, None, &model, &ranges, options)?;
         own.push(whole.saturation);
         let saturation = common.as_ref().map_or(whole.saturation, |list| list[k]);
-        let cost_on = |at: &Solution, on: &Samples<'_>| -> f64 {
-            let sums = passes::sums(on, &at.lobes, &at.weights, saturation, Want::Gradient);
-            sums.iter().map(|s| s.cost).sum::<f64>() * unit
-        };
-        cost += cost_on(&whole.solution, &samples);
+        let cost_on = |at: &Solution, on: &Samples<'_>| unit * cost(at, on, saturation.zip(options.robust));
+        total += cost_on(&whole.solution, &samples);
         directions = directions.max(samples.len());
-        energy += self::energy(&samples, &whole.solution) * unit;
+        energy += energy_of(&samples, &whole.solution, options.robust.is_some()) * unit;
         residuals += samples.residuals();
         parameters += whole.uncertainty.errors.len();
         effective = effective.zip(whole.structure).map(|(sum, s)| sum + s.effective_samples);
@@ -226,7 +225,7 @@ fn candidate(
     let candidate = ModelCandidate {
         model: options.model.to_string(),
         parameters: parameters as u64,
-        rmse: rms((cost, residuals)),
+        rmse: rms((total, residuals)),
         held_out_rmse: rms(held_out.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1))),
         aicc: f64::NAN,
         bic: f64::NAN,
@@ -236,8 +235,23 @@ fn candidate(
     Ok(Tried { candidate, effective, rounding, folds: held_out.map(rms).collect(), part })
 }
 
-/// Σ r² where every weight is 0, without a robust loss.
-fn energy(samples: &Samples<'_>, at: &Solution) -> f64 {
+/// Σ w r². Under a robust loss an outlier counts as much as one sample can, for its own size says nothing of a model: Σ w s²/3 ρ with Tukey's
+/// bisquare, which is Σ w r² where residuals are small.
+fn cost(at: &Solution, on: &Samples<'_>, robust: Option<((RobustKind, f64), Robust)>) -> f64 {
+    match robust {
+        None => passes::sums(on, &at.lobes, &at.weights, None, Want::Gradient).iter().map(|s| s.cost).sum(),
+        Some(((_, s), robust)) => {
+            let s = JUDGE_SCALE * s / robust.scale;
+            bounded_cost(on, at, s) * s * s / 3.0
+        }
+    }
+}
+
+/// Σ w r² where every weight is 0; under a robust loss what it would be if all values had their median size.
+fn energy_of(samples: &Samples<'_>, at: &Solution, is_robust: bool) -> f64 {
+    if is_robust {
+        return samples.residuals() as f64 * sizes(samples, at).0.powi(2);
+    }
     let nothing: Vec<_> = at.weights.iter().map(|x| x * 0.0).collect();
     passes::sums(samples, &at.lobes, &nothing, None, Want::Gradient).iter().map(|s| s.cost).sum()
 }

@@ -30,7 +30,7 @@ pub(super) fn by_passes(part: &Problem<'_>, at: &Solution, uncertainty: &mut Unc
         solver::least_cost(&streamed, &held.bounds, &at.t).unwrap_or(f64::INFINITY)
     };
     let least = cost(part);
-    let noise = bounded_noise(part, at).unwrap_or(least);
+    let noise = bounded_noise(part, at).map_or(least, |noise| noise.min(least));
     mark(part, at, uncertainty, &Least { cost: least, noise, resolved: RESOLVED * least }, cost);
 }
 

@@ -205,18 +205,17 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
         (solution, met, found.report) = robust::settle(&mut problem, (&few, &more), solution, robust, options)?;
     }
     let mut judged = judge(&problem, &more, &solution, options)?;
+    let mut ends_here = true;
     for _ in 0..VALLEYS {
         let Some(lower) = judged.lower.take() else { break };
-        let before = problem.saturation;
-        let (resettled, has_met) = robust::resettle(&mut problem, lower, options)?;
-        if robust::grows(before, problem.saturation) || met && !has_met {
-            // Lower at the s of the one it left, but of a larger s of its own: the smallest s decides, as among the starts.
-            problem.saturation = before;
-            judged.intervals = intervals::by_passes_from_here(&problem, &judged.solution, &judged.uncertainty);
-            break;
-        }
-        (solution, met) = (resettled, has_met);
-        judged = judge(&problem, &more, &solution, options)?;
+        let moved = robust::resettle(&problem, (&judged.solution, met), lower, options);
+        ends_here = moved.is_some();
+        let Some(moved) = moved else { break };
+        (problem.saturation, met) = (moved.saturation, moved.met);
+        judged = judge(&problem, &more, &moved.at, options)?;
+    }
+    if !ends_here || judged.lower.is_some() {
+        judged.intervals = intervals::by_passes_from_here(&problem, &judged.solution, &judged.uncertainty);
     }
     let unsettled = if met { None } else { robust::left(&problem, &judged.solution, options) };
     found.outcome = judged.outcome;

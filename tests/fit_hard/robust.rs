@@ -1,7 +1,7 @@
 //! Robust fits: the scale s that they settle at, and what they say where it does not settle.
 
 use goniofit::brdf::Material;
-use goniofit::fit::{Bootstrap, Datum, FitOptions, Limit, Loss, Robust, RobustKind};
+use goniofit::fit::{Bootstrap, Datum, FitOptions, Limit, Loss, Robust, RobustKind, fit_best_model};
 use goniofit::geometry::theta_of;
 use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
@@ -106,7 +106,8 @@ fn a_scale_that_can_not_settle_is_said_to_be_so_with_what_the_residuals_ask_for(
     let said = record(&got).warnings.iter().find(|w| w.starts_with("the robust scale has not settled"));
     let said = said.unwrap_or_else(|| panic!("{:?}", record(&got).warnings));
     println!("{said}");
-    assert!(left > 1e-5 && said.contains(&format!("differs by {:.1e} %", 100.0 * left)), "{left:e}: {said}");
+    // Far from settled is another matter than not settled: 1e-6 is what counts as settled.
+    assert!(left > 1e-6 && said.contains(&format!("differs by {:.1e} %", 100.0 * left)), "{left:e}: {said}");
     // At the usual scale it settles, and nothing is said.
     let usual = solved(&m, &FitOptions { robust: robust(RobustKind::Cauchy), ..o });
     assert!(!record(&usual).warnings.iter().any(|w| w.contains("settled")), "{:?}", record(&usual).warnings);
@@ -135,6 +136,16 @@ fn leaning(seed: u64, share: f64) -> Measurement {
     m
 }
 
+/// Σ 1 − (1 − r²/s²)³ of two fits at one s, 4.685 times the smaller median deviation: by how many samples the first is the worse one.
+fn worse_by(m: &Measurement, one: &Material, other: &Material, o: &FitOptions) -> f64 {
+    let lists = [one, other].map(|of| residuals(m, of, o));
+    let least = lists.iter().map(|list| spread(list)).fold(f64::INFINITY, f64::min);
+    let s = 4.685 * least * (1.0 + 3.5 / (lists[0].len() as f64).sqrt());
+    let bisquare = |(r, w): &(f64, f64)| w * (1.0 - (1.0 - (r / s).powi(2)).max(0.0).powi(3));
+    let [one, other] = lists.map(|list| list.iter().map(bisquare).sum::<f64>());
+    one - other
+}
+
 /// A minimum inside a range is one of the whole range too: the search over more may not end in a worse one.
 #[test]
 fn a_free_robust_fit_is_never_worse_than_one_bounded_around_the_truth() {
@@ -147,15 +158,9 @@ fn a_free_robust_fit_is_never_worse_than_one_bounded_around_the_truth() {
         let [free, bounded] = [free, bounded].map(|o| solved(&m, &o));
         // At an end of the range it is no minimum of the free fit's.
         let inside = (1.01 * low..0.99 * high).contains(&exponent(&bounded, 1));
-        let [f, b] = [&free, &bounded].map(|m| (record(m).robust_scale[0], record(m).cost));
-        let (grows, costs) = ((f.0 / b.0).ln(), (f.1 / b.1).ln() - 2.0 * (f.0 / b.0).ln());
-        let worse = grows > ALIKE || grows > -ALIKE && costs > ALIKE;
-        let said = format!(
-            "{kind:?} {share} seed {seed}: {} at {f:?}, {} at {b:?}",
-            exponent(&free, 1),
-            exponent(&bounded, 1)
-        );
-        (inside && worse).then_some(said)
+        let worse = worse_by(&m, &free, &bounded, &options("lambert+phong"));
+        let [f, b] = [&free, &bounded].map(|m| (exponent(m, 1), record(m).robust_scale[0]));
+        (inside && worse > 0.1).then(|| format!("{kind:?} {share} seed {seed}: {f:?}, {b:?}, worse by {worse:.3}"))
     };
     let shares = [0.1, 0.2, 0.3];
     let kinds = RobustKind::ALL.into_iter().flat_map(|k| shares.map(|share| (k, share)));
@@ -164,8 +169,62 @@ fn a_free_robust_fit_is_never_worse_than_one_bounded_around_the_truth() {
     assert!(worse.is_empty(), "{} of 600: {worse:#?}", worse.len());
 }
 
-/// Scales that settle this closely on the part of the samples are alike.
-const ALIKE: f64 = 4e-3;
+/// In-plane readings every 5° of a lobe that few of them see, with normal noise and whatever `spoil` does to a reading.
+fn few_see_it(seed: u64, incidences: &[f64], truth: &Material, noise: f64, spoil: fn(f64) -> f64) -> Measurement {
+    let rng = &mut draws(seed);
+    let towards = |theta: f64| glam::DVec3::new(theta.to_radians().sin(), 0.0, theta.to_radians().cos());
+    let pairs = incidences.iter().flat_map(|i| (-16..=16).map(move |o| (-*i, 5.0 * f64::from(o))));
+    let (wi, wo) = pairs.map(|(i, o)| (towards(i), towards(o))).unzip();
+    let directions = Directions::List { wi, wo };
+    let weights = Weights::Uniform;
+    let scan = Scan::List { name: "in plane".into(), directions, weights, dimension: Dimension::Space };
+    let mut m = exact(truth, &scan);
+    m.values.iter_mut().for_each(|v| *v = spoil(*v + noise * normal(rng)));
+    m
+}
+
+/// What happens to a reading.
+type Spoil = fn(f64) -> f64;
+/// Name and kind of what happens to readings, incidences, exponent, weight, loss, seed.
+type Case<'a> = (&'a str, Spoil, &'a [f64], f64, f64, RobustKind, u64);
+
+/// Data without outliers are not a lobe's worth of outliers: where the plain fit knows the lobe, the robust one finds it.
+#[test]
+fn a_robust_fit_of_clean_data_finds_the_lobe_that_the_plain_fit_finds() {
+    let kept = |v: f64| v;
+    let clipped = |v: f64| v.max(0.0);
+    let rounded = |v: f64| (v / 0.01).round() * 0.01;
+    let spoils: [(&str, Spoil); 3] = [("clean", kept), ("clipped", clipped), ("rounded", rounded)];
+    let scans: [&[f64]; 3] = [&[30.0], &[10.0, 30.0, 50.0], &[0.0, 15.0, 30.0, 45.0, 60.0]];
+    let lobes = [(20.0, 0.2), (137.0, 0.1), (500.0, 0.3), (2000.0, 0.3)];
+    let mut cases = Vec::new();
+    for (name, spoil) in spoils {
+        for scan in scans {
+            // A lobe that a single reading sees can't be told from an outlier.
+            for (n, ks) in lobes.into_iter().filter(|(n, _)| scan.len() > 1 || *n < 1000.0) {
+                for kind in RobustKind::ALL {
+                    cases.extend((0..20).map(|seed| (name, spoil, scan, n, ks, kind, seed)));
+                }
+            }
+        }
+    }
+    let one = |(name, spoil, scan, n, ks, kind, seed): Case<'_>| {
+        let m = few_see_it(seed, scan, &material(&[0.1], &[ks], n), 0.02, spoil);
+        let o = options("lambert+phong");
+        let plain = solved(&m, &o);
+        if rel(exponent(&plain, 1), n) > 0.2 {
+            return None;
+        }
+        let got = solved(&m, &FitOptions { robust: robust(kind), ..o });
+        let found = rel(exponent(&got, 1), n) < 0.5 && rel(got.lobes[1].weight[0], ks) < 0.5;
+        let said = format!("{name} {} incidences, n {n}, {kind:?}, seed {seed}: {:?}", scan.len(), parameters(&got));
+        Some(if found { Ok(()) } else { Err(said) })
+    };
+    let all: Vec<Result<(), String>> = cases.into_par_iter().filter_map(one).collect();
+    let lost: Vec<&String> = all.iter().filter_map(|r| r.as_ref().err()).collect();
+    println!("{} of {} lost", lost.len(), all.len());
+    assert!(all.len() > 1000 && lost.is_empty(), "{} of {}: {lost:#?}", lost.len(), all.len());
+}
 
 /// The pull of one value, however large, ends at s, and so must what it does to the fit.
 #[test]
@@ -185,6 +244,20 @@ fn one_value_however_large_moves_a_robust_fit_no_further_than_a_large_one() {
             let off = pairs.map(|((a, b), e)| (a - b).abs() / e.expect("an error")).fold(0.0, f64::max);
             println!("{kind:?} {value:e}: {off:.1e} standard errors off");
             assert!(off < 0.1, "{kind:?} {value:e}: {:?}, not {:?}", parameters(&got), parameters(&large));
+        }
+    }
+}
+
+/// An outlier's own cost is no model's fault.
+#[test]
+fn one_huge_value_does_not_choose_the_model() {
+    for kind in RobustKind::ALL {
+        for value in [None, Some(1e3), Some(1e16), Some(9.9e37)] {
+            let mut m = leaning(11, 0.0);
+            m.values[30] = value.unwrap_or(m.values[30]);
+            let got = fit_best_model(&m, &FitOptions { robust: robust(kind), ..options("lambert") }).expect("a fit");
+            let choice = record(&got.material).choice.as_ref().expect("a choice");
+            assert_eq!(choice.chosen, "lambert+phong", "{kind:?} {value:?}: {choice:?}");
         }
     }
 }

@@ -1,11 +1,20 @@
 //! Pairs of parameters and s that compare: which one is the fit.
+//!
+//! Of two fits of their own s neither the costs compare nor the s: a median deviation of N residuals scatters by 1.2/√N, and a fit that gives up
+//! a lobe's few samples may well have the smaller one. So all are judged by one cost at one s, by a loss to which an outlier is no more than
+//! one sample (as MM-estimates are: Yohai 1987).
 
+use super::spread::bounded_cost;
 use crate::fit::passes::Saturation;
-use crate::fit::reduced::Solution;
+use crate::fit::reduced::{Problem, Solution};
 use crate::fit::start::SearchReport;
 
-/// Two scales that differ by no more, relatively, are alike on a part of the samples, and so are costs over s².
-pub(super) const ALIKE: f64 = 4e-3;
+/// s of the judging loss over σ: 95 % as efficient as least squares where noise is normal.
+pub(in crate::fit) const JUDGE_SCALE: f64 = 4.685;
+/// Three standard deviations of the median deviation of normal noise, relative, times the root of its number.
+const MARGIN: f64 = 3.5;
+/// Two fits are alike whose judging costs differ by no more a residual: noise makes it about 0.12.
+const ALIKE: f64 = 1e-5;
 
 /// Parameters and their s, as far as they were followed.
 pub(super) struct Candidate {
@@ -13,48 +22,59 @@ pub(super) struct Candidate {
     pub saturation: Saturation,
     /// Whether the two have met.
     pub met: bool,
-    /// The s that residuals which say something ask for.
-    pub rank: f64,
-    /// The cost over s², that of rounding at least.
-    pub height: f64,
+    /// σ by the median deviation of the residuals that say something.
+    pub sigma: f64,
 }
 
-impl Candidate {
-    /// Whether neither of two is better than the other.
-    fn is_alike(&self, other: &Self) -> bool {
-        let close = |a: f64, b: f64| a == b || (a / b).ln().abs() <= ALIKE;
-        self.met == other.met && close(self.rank, other.rank) && close(self.height, other.height)
+/// The candidates of one problem, to be taken best first.
+pub(super) struct Ranking {
+    /// With each one's cost.
+    list: Vec<(Candidate, f64)>,
+    /// Costs that differ by less are alike.
+    tolerance: f64,
+}
+
+impl Ranking {
+    /// Those whose residuals are all finite. `rounding` is the σ up to which they may be rounding.
+    pub fn new(problem: &Problem<'_>, rounding: f64, list: Vec<Candidate>) -> Self {
+        let any_met = list.iter().any(|c| c.met);
+        let counting = list.iter().filter(|c| c.met || !any_met).map(|c| c.sigma);
+        let least = counting.fold(f64::INFINITY, f64::min).max(rounding);
+        // The smallest of several is too small as a rule, by what a median deviation of so few scatters.
+        let residuals = problem.samples.residuals() as f64;
+        let margin = 1.0 + MARGIN / residuals.sqrt();
+        let s = JUDGE_SCALE * margin * least;
+        let judged = |c: Candidate| {
+            let cost = bounded_cost(problem.samples, &c.at, s);
+            (c, cost)
+        };
+        let list = list.into_iter().map(judged).filter(|(c, cost)| c.sigma.is_finite() && cost.is_finite()).collect();
+        Self { list, tolerance: ALIKE * residuals }
     }
-}
 
-/// The best of several, taken out: of those that have met, and have an s as small as the smallest, the lowest; of alike ones the last. `None`
-/// of none.
-pub(super) fn take_best(list: &mut Vec<Candidate>) -> Option<Candidate> {
-    let any_met = list.iter().any(|c| c.met);
-    let counts = |c: &&Candidate| c.met || !any_met;
-    let limit = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min) * (1.0 + ALIKE);
-    let rank = limit(&mut list.iter().filter(counts).map(|c| c.rank));
-    let near = |c: &&Candidate| counts(c) && c.rank <= rank;
-    let height = limit(&mut list.iter().filter(near).map(|c| c.height));
-    let best = list.iter().rposition(|c| near(&c) && c.height <= height).or_else(|| list.len().checked_sub(1))?;
-    Some(list.remove(best))
-}
-
-/// The best of several, and where the others ended. `None` of none.
-pub(super) fn best_of(mut list: Vec<Candidate>) -> Option<(Candidate, SearchReport)> {
-    let starts = list.len();
-    let best = take_best(&mut list)?;
-    let reached = 1 + list.extract_if(.., |other| other.is_alike(&best)).count();
-    let mut minima = 1;
-    while let Some(next) = take_best(&mut list) {
-        list.retain(|other| !other.is_alike(&next));
-        minima += 1;
+    /// How many are left.
+    pub fn len(&self) -> usize {
+        self.list.len()
     }
-    let report = SearchReport { starts, reached, minima, ..SearchReport::default() };
-    Some((best, report))
-}
 
-/// Takes out those that are alike to one.
-pub(super) fn without_like(list: &mut Vec<Candidate>, one: &Candidate) {
-    list.retain(|other| !other.is_alike(one));
+    /// Takes the best out, and all that are alike to it; says how many that were. Of alike ones the last is the best; one whose s has not settled
+    /// loses to one whose has.
+    pub fn take(&mut self) -> Option<(Candidate, usize)> {
+        let met = self.list.iter().any(|(c, _)| c.met);
+        let lowest =
+            self.list.iter().filter(|(c, _)| c.met == met).map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
+        let is_alike = |(c, cost): &(Candidate, f64)| c.met == met && cost - lowest <= self.tolerance;
+        let (alike, others) = std::mem::take(&mut self.list).into_iter().partition::<Vec<_>, _>(is_alike);
+        self.list = others;
+        let count = alike.len();
+        alike.into_iter().next_back().map(|(best, _)| (best, count))
+    }
+
+    /// Takes the best, and tells where the others ended.
+    pub fn settle(mut self) -> Option<(Candidate, SearchReport)> {
+        let starts = self.len();
+        let (best, reached) = self.take()?;
+        let minima = 1 + std::iter::from_fn(|| self.take()).count();
+        Some((best, SearchReport { starts, reached, minima, ..SearchReport::default() }))
+    }
 }

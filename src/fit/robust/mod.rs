@@ -3,7 +3,7 @@
 //! s is a multiple of the residuals' own spread, which depends on the parameters, which depend on s. The way in is from above: the
 //! plain fit's spread is too large where outliers pull it; as they let go it shrinks, and the parameters follow. There may be several such
 //! pairs, and outliers may hide the right one from the plain fit: so there are other ways in ([`starts`]). Of the pairs found on a part of the
-//! samples one of the smallest s ([`candidate`]) is followed on all.
+//! samples the best one ([`candidate`]) is followed on all.
 
 mod candidate;
 mod spread;
@@ -17,8 +17,10 @@ use super::part::descend;
 use super::passes::Saturation;
 use super::reduced::{Problem, Solution};
 use super::start::SearchReport;
-use candidate::{ALIKE, Candidate};
-use spread::Spread;
+pub(super) use candidate::JUDGE_SCALE;
+use candidate::{Candidate, Ranking};
+pub(super) use spread::{bounded_cost, sizes};
+use spread::{spread, telling_spread};
 use way::Way;
 
 /// Rounds in which s settles at most.
@@ -57,21 +59,33 @@ pub(super) fn settle(
     Ok((at, met, report))
 }
 
-/// As [`settle`], from a point and an s near the answer's; the point alone where the loss is not robust.
-pub(super) fn resettle(
-    problem: &mut Problem<'_>,
-    near: Solution,
-    options: &FitOptions,
-) -> Result<(Solution, bool), FitError> {
-    let Some(robust) = options.robust else { return Ok((near, true)) };
-    let settling = Settling::new(problem, &near, robust, options);
-    let at = descend(problem, &near, options.max_iterations, Digits::Rough)?.0;
-    settling.follow(problem, at, aim(problem))
+/// A robust fit on all samples.
+pub(super) struct Robustly {
+    pub at: Solution,
+    pub saturation: Saturation,
+    /// Whether the two have met.
+    pub met: bool,
 }
 
-/// Whether one s is clearly larger than another.
-pub(super) fn grows(from: Saturation, to: Saturation) -> bool {
-    from.zip(to).is_some_and(|((_, from), (_, to))| (to / from).ln() > ALIKE)
+/// As [`settle`], from a point `near` a valley that is lower at the problem's s; the fit that `here` is where that is no better at an s of its
+/// own, by [`Ranking`]. Without a robust loss the point alone. `None` stands for `here`.
+pub(super) fn resettle(
+    problem: &Problem<'_>,
+    here: (&Solution, bool),
+    near: Solution,
+    options: &FitOptions,
+) -> Option<Robustly> {
+    let Some(robust) = options.robust else { return Some(Robustly { at: near, saturation: None, met: true }) };
+    let settling = Settling::new(problem, &near, robust, options);
+    let mut there = problem.on(problem.samples);
+    there.saturation = problem.saturation;
+    let at = descend(&there, &near, options.max_iterations, Digits::Rough).ok()?.0;
+    let (at, met) = settling.follow(&mut there, at, aim(problem)).ok()?;
+    let stays = settling.judged(problem, here.0.clone(), here.1);
+    let goes = settling.judged(&there, at, met);
+    let (best, alike) = Ranking::new(problem, settling.rounding, vec![stays, goes]).take()?;
+    let moves = alike == 1 && best.saturation == there.saturation;
+    moves.then_some(Robustly { at: best.at, saturation: best.saturation, met: best.met })
 }
 
 /// ln(the s that the residuals ask for / the problem's s), where that is worth a word.
@@ -92,13 +106,19 @@ struct Settling {
     robust: Robust,
     /// Most steps of a descent.
     steps: u64,
+    /// Median size of the data that are not 0, as residuals.
+    typical: f64,
     /// A spread below this is rounding.
     rounding: f64,
+    /// The value that a good part of the data have, if any.
+    common: Option<f64>,
 }
 
 impl Settling {
     fn new(problem: &Problem<'_>, like: &Solution, robust: Robust, options: &FitOptions) -> Self {
-        Self { robust, steps: options.max_iterations, rounding: spread::rounding(problem, like) }
+        let (typical, rounding) = sizes(problem.samples, like);
+        let common = spread::common_value(problem);
+        Self { robust, steps: options.max_iterations, typical, rounding, common }
     }
 
     /// Follows s roughly.
@@ -111,12 +131,8 @@ impl Settling {
 
     /// A point of a problem with its s, to be compared.
     fn judged(&self, problem: &Problem<'_>, at: Solution, met: bool) -> Candidate {
-        let s = problem.saturation.map_or(1.0, |(_, s)| s);
-        let rank = self.robust.scale * Spread::new(problem, &at).telling.max(self.rounding);
-        // What rounding leaves of the cost tells nothing.
-        let least = problem.samples.residuals() as f64 * (self.rounding / s).powi(2);
-        let height = (at.cost / (s * s)).max(least);
-        Candidate { at, saturation: problem.saturation, met, rank, height }
+        let sigma = telling_spread(problem.samples, &at, self.common, self.rounding);
+        Candidate { at, saturation: problem.saturation, met, sigma }
     }
 
     /// Brings ln(new s) − ln(old s) to 0 by secants, within the bracket that is known; the parameters follow. Says
@@ -142,11 +158,12 @@ impl Settling {
                 return Ok((at, true));
             }
         }
-        Ok((at, false))
+        let met = (self.asked(problem, &at) / s).ln().abs() <= UNSETTLED;
+        Ok((at, met))
     }
 
     /// The s that the residuals ask for.
     fn asked(&self, problem: &Problem<'_>, at: &Solution) -> f64 {
-        self.robust.scale * Spread::new(problem, at).all.max(self.rounding)
+        self.robust.scale * spread(problem.samples, at).clamp(self.rounding, f64::INFINITY)
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::fit::passes::Scratch;
 use crate::fit::reduced::{Problem, Solution};
-use crate::fit::samples::Block;
+use crate::fit::samples::Samples;
 
 /// Residuals below this share of the data are rounding, and no scale below this can be squared.
 const ROUNDING: f64 = 1e-13;
@@ -11,38 +11,58 @@ const SMALLEST: f64 = 1e-140;
 /// σ of normal noise over its median absolute deviation.
 const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
-/// σ of residuals by their median absolute deviation from their median.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Spread {
-    /// Of all.
-    pub all: f64,
-    /// Of those that say something: where the data are 0 and the model is too, they agree whatever the others are.
-    pub telling: f64,
+/// σ of the residuals by their median absolute deviation from their median.
+pub(super) fn spread(samples: &Samples<'_>, at: &Solution) -> f64 {
+    deviation(&mut residuals(samples, at))
 }
 
-impl Spread {
-    pub fn new(problem: &Problem<'_>, at: &Solution) -> Self {
-        let (mut all, mut telling) = (Vec::new(), Vec::new());
-        let pieces =
-            gathered(problem, at, |scratch, block, c, i| (scratch.r[i], block.y[c][i] != 0.0 || scratch.f[i] != 0.0));
-        for (r, tells) in pieces {
-            all.push(r);
-            if tells {
-                telling.push(r);
-            }
+/// As [`spread`], of the values that are not `common` if one is, `rounding` at least.
+pub(super) fn telling_spread(samples: &Samples<'_>, at: &Solution, common: Option<f64>, rounding: f64) -> f64 {
+    let pieces = of_residuals(samples, at, Vec::new(), |list, y, _, r| {
+        if common != Some(y) {
+            list.push(r);
         }
-        Self { all: sigma(&mut all), telling: sigma(&mut telling) }
-    }
+    });
+    deviation(&mut pieces.concat()).clamp(rounding, f64::INFINITY)
 }
 
-/// A spread that may be rounding, by the data alone, for all fits to them to be judged alike: a share of the median size of the residuals that
-/// there are without any lobe and are not 0, which no gross outlier moves far.
-pub(super) fn rounding(problem: &Problem<'_>, like: &Solution) -> f64 {
+/// The value that a quarter of the data have or more, if any: what is clipped at 0, or rounded to one step. It agrees with a fit that has it,
+/// whatever that makes of the others.
+pub(super) fn common_value(problem: &Problem<'_>) -> Option<f64> {
+    let step = problem.samples.len().div_ceil(ENOUGH).max(1);
+    let some = problem.samples.listed(|i| i % step == 0);
+    let pieces = some.map_pieces(Vec::new, |list: &mut Vec<f64>, block| {
+        for c in 0..problem.ranges.len() {
+            let counting = block.y[c].iter().zip(block.weight(c)).filter(|(_, w)| **w > 0.0);
+            list.extend(counting.map(|(y, _)| *y));
+        }
+    });
+    let mut values = pieces.concat();
+    values.sort_by(f64::total_cmp);
+    let longest = values.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
+    (4 * longest.len() >= values.len() && longest.len() < values.len()).then(|| longest[0])
+}
+
+/// Samples that tell how often a value occurs.
+const ENOUGH: usize = 10_000;
+
+/// σ by the median absolute deviation from the median; leaves the absolute deviations.
+fn deviation(r: &mut [f64]) -> f64 {
+    let centre = median(r);
+    r.iter_mut().for_each(|r| *r = (*r - centre).abs());
+    MAD_TO_SIGMA * median(r)
+}
+
+/// Median size of the residuals that there are without any lobe and are not 0, which no gross outlier moves far, and the spread up to which it
+/// may be rounding: by the data alone, for all fits to them to be judged alike.
+pub(in crate::fit) fn sizes(samples: &Samples<'_>, like: &Solution) -> (f64, f64) {
     let mut nothing = like.clone();
     nothing.weights.iter_mut().for_each(|x| x.fill(0.0));
-    let mut sizes = gathered(problem, &nothing, |scratch, _, _, i| scratch.r[i].abs());
-    sizes.retain(|size| *size > 0.0);
-    (ROUNDING * median(&mut sizes)).max(SMALLEST)
+    let mut sizes = residuals(samples, &nothing);
+    sizes.retain(|r| *r != 0.0);
+    sizes.iter_mut().for_each(|r| *r = r.abs());
+    let typical = median(&mut sizes);
+    (typical, (ROUNDING * typical).max(SMALLEST))
 }
 
 /// Median size of the values, where that is not 0.
@@ -57,28 +77,37 @@ pub(super) fn typical(problem: &Problem<'_>) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }
 
-/// What `of` makes of every residual that counts: it is given its block, its channel and its place there.
-fn gathered<T: Send>(
-    problem: &Problem<'_>,
-    at: &Solution,
-    of: impl Fn(&Scratch, &Block, usize, usize) -> T + Sync,
-) -> Vec<T> {
-    let start = || (Vec::new(), Scratch::default());
-    let pieces = problem.samples.map_pieces(start, |(list, scratch), block| {
-        scratch.basis(&block.x, &at.lobes);
-        for (c, x) in at.weights.iter().enumerate() {
-            scratch.residuals(problem.samples, block, c, x, None);
-            let w = block.weight(c);
-            list.extend((0..w.len()).filter(|&i| w[i] > 0.0).map(|i| of(scratch, block, c, i)));
-        }
+/// Σ w ρ(r/s) with Tukey's bisquare, 1 − (1 − r²/s²)³ up to s and 1 beyond: however far off a residual is, it costs its weight at most.
+pub(in crate::fit) fn bounded_cost(samples: &Samples<'_>, at: &Solution, s: f64) -> f64 {
+    let pieces = of_residuals(samples, at, 0.0, |sum, _, w, r| {
+        let inside = (1.0 - (r / s) * (r / s)).max(0.0);
+        *sum += if r.is_nan() { f64::NAN } else { w * (1.0 - inside * inside * inside) };
     });
-    pieces.into_iter().flat_map(|p| p.0).collect()
+    pieces.iter().sum()
 }
 
-fn sigma(r: &mut [f64]) -> f64 {
-    let centre = median(r);
-    r.iter_mut().for_each(|r| *r = (*r - centre).abs());
-    MAD_TO_SIGMA * median(r)
+/// The residuals that count.
+fn residuals(samples: &Samples<'_>, at: &Solution) -> Vec<f64> {
+    of_residuals(samples, at, Vec::new(), |list, _, _, r| list.push(r)).concat()
+}
+
+/// What `add` makes of the data, weights and residuals of each piece of the samples, in order.
+fn of_residuals<T: Clone + Send + Sync>(
+    samples: &Samples<'_>,
+    at: &Solution,
+    empty: T,
+    add: impl Fn(&mut T, f64, f64, f64) + Sync,
+) -> Vec<T> {
+    let start = || (empty.clone(), Scratch::default());
+    let pieces = samples.map_pieces(start, |(sum, scratch), block| {
+        scratch.basis(&block.x, &at.lobes);
+        for (c, x) in at.weights.iter().enumerate() {
+            scratch.residuals(samples, block, c, x, None);
+            let (w, y) = (block.weight(c), &block.y[c]);
+            (0..w.len()).filter(|&i| w[i] > 0.0).for_each(|i| add(sum, y[i], w[i], scratch.r[i]));
+        }
+    });
+    pieces.into_iter().map(|(sum, _)| sum).collect()
 }
 
 fn median(list: &mut [f64]) -> f64 {

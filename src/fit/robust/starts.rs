@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::Settling;
-use super::candidate::{Candidate, best_of, take_best, without_like};
+use super::candidate::{Candidate, Ranking};
 use super::spread::typical;
 use super::way::SHRINK;
 use crate::fit::covariance::pinned;
@@ -29,8 +29,8 @@ const MOST_FOLLOWED: usize = 2;
 const FEWEST_RESIDUALS: usize = 5;
 
 impl Settling {
-    /// Where to begin, from the parts of the samples: from the plain fit, from a lattice, or from the model with a lobe fewer. Only the plain
-    /// start must lead somewhere.
+    /// Where to begin, from the parts of the samples: from the plain fit, from a lattice, or from the model with a lobe fewer. One of them
+    /// must lead somewhere.
     pub(super) fn begin(
         &self,
         few: &Problem<'_>,
@@ -38,12 +38,19 @@ impl Settling {
         plain: Solution,
     ) -> Result<(Candidate, SearchReport), FitError> {
         let smaller = self.smaller(few, more);
-        let mut found = vec![self.after_plain(few, more, plain)?];
-        found.extend(self.by_lattice(few, more, smaller.as_ref()));
+        let plain = self.after_plain(few, more, plain);
+        let mut found = self.by_lattice(few, more, smaller.as_ref());
         // Outliers may hold the plain fit of many lobes where that of few lets them go; of alike ones it is the one to go on from, for its
         // lobes are not two that stand in one place.
-        found.extend(smaller.and_then(|s| self.candidate(more, s.saturation, with_a_lobe_more(more, &s)).ok()));
-        best_of(found).ok_or_else(|| FitError::Solver { reason: "no start".into() })
+        let richer = smaller.and_then(|s| self.candidate(more, s.saturation, with_a_lobe_more(more, &s)).ok());
+        match plain {
+            Ok(plain) => found.insert(0, plain),
+            Err(error) if found.is_empty() && richer.is_none() => return Err(error),
+            Err(_) => {}
+        }
+        found.extend(richer);
+        let ranking = Ranking::new(more, self.rounding, found);
+        ranking.settle().ok_or_else(|| FitError::Solver { reason: "no robust fit has finite residuals".into() })
     }
 
     /// Beginning with the plain fit and its s.
@@ -54,8 +61,7 @@ impl Settling {
         // Outliers may have drawn the plain fit into another valley: the robust cost has the last word on where to go on.
         let other = start::search_streamed(&few, &more, self.steps)?;
         let other = Streamed::new(&more).solve(other.outcome.parameters.as_slice());
-        let candidates = [plain, other].map(|start| descend(&more, &start, self.steps, Digits::Rough));
-        let [plain, other] = candidates;
+        let [plain, other] = [plain, other].map(|start| descend(&more, &start, self.steps, Digits::Rough));
         let (plain, other) = (plain?.0, other?.0);
         self.candidate(&more, saturation, if other.cost < plain.cost { other } else { plain })
     }
@@ -75,6 +81,9 @@ impl Settling {
     /// Beginning with a lattice of the last shape, the others as the model with a lobe fewer has them: its valleys, followed. It knows nothing of
     /// the plain fit; without a smaller model weights and s begin with the data's own size and spread.
     fn by_lattice(&self, few: &Problem<'_>, more: &Problem<'_>, smaller: Option<&Candidate>) -> Vec<Candidate> {
+        if smaller.is_none() && few.layout.len() > 1 {
+            return Vec::new(); // there is one, but it has no fit
+        }
         let free = pinned(few, few.ranges.len()).iter().filter(|held| !**held).count();
         if few.samples.residuals() < FEWEST_RESIDUALS * free {
             return Vec::new();
@@ -90,17 +99,30 @@ impl Settling {
         };
         let profile: Vec<Candidate> = start::last_nodes(few).par_iter().map(at_node).collect();
         let follow = |valley: Candidate| gentle.descended(few, valley.saturation, &valley.at).ok();
-        let ends: Vec<Option<Candidate>> = valleys(profile).into_par_iter().map(follow).collect();
-        let mut ends: Vec<Candidate> = ends.into_iter().flatten().collect();
+        let ends: Vec<Option<Candidate>> = self.valleys(few, profile).into_par_iter().map(follow).collect();
+        let mut ends = Ranking::new(few, self.rounding, ends.into_iter().flatten().collect());
         let mut found = Vec::new();
         for _ in 0..MOST_FOLLOWED {
-            let Some(best) = take_best(&mut ends) else { break };
-            without_like(&mut ends, &best);
+            let Some((best, _)) = ends.take() else { break };
             let Ok(own) = gentle.descended(more, best.saturation, &best.at) else { continue };
             let saturation = Some((self.robust.kind, self.asked(more, &own.at)));
             found.extend(self.descended(more, saturation, &own.at));
         }
         found
+    }
+
+    /// The nodes below their neighbours in σ or in cost, the best ones.
+    fn valleys(&self, problem: &Problem<'_>, profile: Vec<Candidate>) -> Vec<Candidate> {
+        let heights: Vec<[f64; 2]> = profile.iter().map(|node| [node.sigma, node.at.cost]).collect();
+        let is_low = |i: usize, of: usize| {
+            let here = heights[i][of];
+            let left = i.checked_sub(1).is_none_or(|j| here < heights[j][of]);
+            left && heights.get(i + 1).is_none_or(|next| here <= next[of])
+        };
+        let low = |(i, node): (usize, Candidate)| (is_low(i, 0) || is_low(i, 1)).then_some(node);
+        let list: Vec<Candidate> = profile.into_iter().enumerate().filter_map(low).collect();
+        let mut ranking = Ranking::new(problem, self.rounding, list);
+        (0..MOST_VALLEYS).map_while(|_| ranking.take().map(|(best, _)| best)).collect()
     }
 
     /// Weights of the data's own size, and the s of the residuals that there are with weights as small as they may be.
@@ -114,7 +136,9 @@ impl Settling {
         let t: Vec<f64> = problem.bounds.iter().map(|b| b.0).collect();
         let weights = |x: f64| problem.ranges.iter().map(|ranges| of(ranges, x)).collect();
         let at = |x: f64| Solution { lobes: problem.shaped(&t), t: Vec::new(), weights: weights(x), cost: f64::NAN };
-        (at(share), self.asked(problem, &at(0.0)))
+        // Where most values are 0 their own deviation is none: those that are not say from where to come down.
+        let s = self.asked(problem, &at(0.0));
+        (at(share), if s > 1.01 * self.robust.scale * self.rounding { s } else { self.robust.scale * self.typical })
     }
 
     /// Weights and s of given shapes, from above, as far as a few rounds go.
@@ -157,17 +181,4 @@ fn with_room(problem: &Problem<'_>, smaller: &Solution) -> Solution {
     let extended = |x: &DVector<f64>, ranges: &[(f64, f64)]| x.clone().insert_row(added, ranges[added].0);
     let weights = smaller.weights.iter().zip(&problem.ranges).map(|(x, ranges)| extended(x, ranges)).collect();
     Solution { weights, ..smaller.clone() }
-}
-
-/// The nodes below their neighbours in s or in cost, the lowest ones.
-fn valleys(profile: Vec<Candidate>) -> Vec<Candidate> {
-    let heights: Vec<[f64; 2]> = profile.iter().map(|node| [node.rank, node.at.cost]).collect();
-    let is_low = |i: usize, of: usize| {
-        let here = heights[i][of];
-        let left = i.checked_sub(1).is_none_or(|j| here < heights[j][of]);
-        left && heights.get(i + 1).is_none_or(|next| here <= next[of])
-    };
-    let low = |(i, node): (usize, Candidate)| (is_low(i, 0) || is_low(i, 1)).then_some(node);
-    let mut list: Vec<Candidate> = profile.into_iter().enumerate().filter_map(low).collect();
-    (0..MOST_VALLEYS).map_while(|_| take_best(&mut list)).collect()
 }
