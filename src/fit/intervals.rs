@@ -25,6 +25,8 @@ const CLOSE: f64 = 1e-4;
 const TRIES: usize = 40;
 const CLOSE_LARGE: f64 = 1e-2;
 const TRIES_LARGE: usize = 8;
+/// An end that is nearer to the estimate than this share of where a parabola has it is no end.
+const JUMP: f64 = 1e-3;
 /// A cost that is lower than the estimate's by this share of the wanted rise is another valley's, not the tolerance of a descent.
 const LOWER: f64 = 0.01;
 
@@ -215,7 +217,8 @@ impl Profile<'_> {
                 return None;
             }
             if excess >= 0.0 {
-                return self.root(near, (far, excess));
+                // A cost that jumps right beside the estimate belongs to another valley: the way along this one was lost.
+                return self.root(near, (far, excess)).filter(|x| (x - value).abs() > JUMP * (guess - value).abs());
             }
             if far == limit {
                 return Some(far);

@@ -204,7 +204,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     if let Some(robust) = options.robust {
         (solution, met, found.report) = robust::settle(&mut problem, (&few, &more), solution, robust, options)?;
     }
-    let mut judged = judge(&problem, &more, &solution, options)?;
+    let mut judged = judge(&problem, &more, &start::ordered(&problem, solution), options)?;
     let mut ends_here = true;
     for _ in 0..VALLEYS {
         let Some(lower) = judged.lower.take() else { break };
@@ -212,7 +212,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
         ends_here = moved.is_some();
         let Some(moved) = moved else { break };
         (problem.saturation, met) = (moved.saturation, moved.met);
-        judged = judge(&problem, &more, &moved.at, options)?;
+        judged = judge(&problem, &more, &start::ordered(&problem, moved.at), options)?;
     }
     if !ends_here || judged.lower.is_some() {
         judged.intervals = intervals::by_passes_from_here(&problem, &judged.solution, &judged.uncertainty);

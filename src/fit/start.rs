@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::options::FitError;
 use super::passes::{self, ShapedLobe};
 use super::quadratic::{Feasible, Quadratic};
-use super::reduced::{Problem, Search};
+use super::reduced::{Problem, Search, Solution};
 use super::solver::{self, LevenbergMarquardt, Linearize, Outcome, SolverOptions};
 use super::streamed::Streamed;
 use crate::brdf::MAX_LOBES;
@@ -162,16 +162,31 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
 
 /// Lobes that could change places get rising shapes, so that one minimum looks the same whichever start found it.
 fn order_alike(problem: &Problem<'_>, outcome: &mut Outcome) {
-    let bounds = problem.bounds.windows(2).all(|b| b[0] == b[1]);
-    let of = |ranges: &Vec<(f64, f64)>| problem.layout.windows(2).all(|l| ranges[l[0].0] == ranges[l[1].0]);
-    if !bounds || !problem.ranges.iter().all(of) {
-        return;
-    }
-    let mut order: Vec<usize> = (0..outcome.parameters.len()).collect();
-    order.sort_by(|&a, &b| outcome.parameters[a].total_cmp(&outcome.parameters[b]));
+    let Some(order) = rising(problem, outcome.parameters.as_slice()) else { return };
     let pick = |list: &[f64]| -> Vec<f64> { order.iter().map(|&i| list[i]).collect() };
     outcome.parameters = DVector::from_vec(pick(outcome.parameters.as_slice()));
     outcome.history.iter_mut().for_each(|step| step.parameters = pick(&step.parameters));
+}
+
+/// As [`order_alike`], of a solution.
+pub(super) fn ordered(problem: &Problem<'_>, at: Solution) -> Solution {
+    let Some(order) = rising(problem, &at.t) else { return at };
+    let lobe = |i: usize| problem.layout[i].0;
+    let mut weights = at.weights.clone();
+    for (to, from) in weights.iter_mut().zip(&at.weights) {
+        order.iter().enumerate().for_each(|(i, &old)| to[lobe(i)] = from[lobe(old)]);
+    }
+    let t: Vec<f64> = order.iter().map(|&i| at.t[i]).collect();
+    Solution { lobes: problem.shaped(&t), t, weights, cost: at.cost }
+}
+
+/// Where each shape stands among them by size; `None` where lobes can't change places, for they may not have the same values.
+fn rising(problem: &Problem<'_>, t: &[f64]) -> Option<Vec<usize>> {
+    let bounds = problem.bounds.windows(2).all(|b| b[0] == b[1]);
+    let of = |ranges: &Vec<(f64, f64)>| problem.layout.windows(2).all(|l| ranges[l[0].0] == ranges[l[1].0]);
+    let mut order: Vec<usize> = (0..t.len()).collect();
+    order.sort_by(|&a, &b| t[a].total_cmp(&t[b]));
+    (bounds && problem.ranges.iter().all(of)).then_some(order)
 }
 
 /// Starts polished of a problem that takes passes.

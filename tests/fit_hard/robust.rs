@@ -1,6 +1,6 @@
 //! Robust fits: the scale s that they settle at, and what they say where it does not settle.
 
-use goniofit::brdf::Material;
+use goniofit::brdf::{LobeKind, Material};
 use goniofit::fit::{Bootstrap, Datum, FitOptions, Limit, Loss, Robust, RobustKind, fit_best_model};
 use goniofit::geometry::theta_of;
 use goniofit::gonio::{Instrument, Scan};
@@ -245,6 +245,23 @@ fn one_value_however_large_moves_a_robust_fit_no_further_than_a_large_one() {
             println!("{kind:?} {value:e}: {off:.1e} standard errors off");
             assert!(off < 0.1, "{kind:?} {value:e}: {:?}, not {:?}", parameters(&got), parameters(&large));
         }
+    }
+}
+
+/// Channels fitted apart find their lobes each in its own order; the file has one.
+#[test]
+fn lobes_of_channels_fitted_apart_are_in_the_same_order() {
+    let lobes = |w: f64, n: f64| (LobeKind::Phong, vec![w, 0.8 * w, 0.6 * w], vec![n]);
+    let base = (LobeKind::Lambert, vec![0.2, 0.15, 0.1], vec![]);
+    let names = ["r", "g", "b"].map(str::to_owned).to_vec();
+    let truth = Material::new(names, vec![base, lobes(0.2, 20.0), lobes(0.1, 300.0)]);
+    for (kind, seed) in RobustKind::ALL.into_iter().flat_map(|k| (0..6).map(move |seed| (k, seed))) {
+        let mut m = measure(&truth, &Instrument::default(), &Scan::InPlane { step_deg: 4.0 }, seed);
+        add_outliers(&mut m, Outliers::OneSided(0.05), &mut draws(seed));
+        let model = options("lambert+phong+phong");
+        let got = solved(&m, &FitOptions { robust: robust(kind), per_channel: true, loss: Loss::L2, ..model });
+        let of = |lobe: usize, c: usize| got.lobes[lobe].shape_of(c).expect("a shape")[0];
+        assert!((0..3).all(|c| of(1, c) < of(2, c)), "{kind:?} {seed}: {:?}", got.lobes);
     }
 }
 
