@@ -20,7 +20,8 @@ pub(super) type Intervals = Vec<Option<Interval>>;
 const NARROW: f64 = 0.03;
 /// A rise of the cost below this share of the data's energy is not resolved by a difference of sums.
 const RESOLVED: f64 = 1e-11;
-/// How far the root of the rise may be off, and steps of the search for each end; on a large table, where each takes passes.
+/// How far the root of the rise may be off, and steps of the search for each end; on a large table, where each takes passes, and in the
+/// rounds of a budget.
 const CLOSE: f64 = 1e-4;
 const TRIES: usize = 40;
 const CLOSE_LARGE: f64 = 1e-2;
@@ -59,50 +60,36 @@ pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &Uncert
 }
 
 /// [`plain`], by profile where that differs, by passes over the samples: few on a large table. Where a profile meets a point lower than the
-/// estimate, and so another valley, that point too, and the other profiles are left out.
+/// estimate, and so another valley, that point too, and the other profiles are left out; all are followed unless `stops_at_lower`.
 pub(super) fn by_passes(
     problem: &Problem<'_>,
     at: &Solution,
     uncertainty: &Uncertainty,
+    stops_at_lower: bool,
 ) -> (Intervals, Option<Solution>) {
-    let lower = RefCell::new(None);
-    let intervals = along_trails(problem, at, uncertainty, Some(&lower));
-    (intervals, lower.into_inner())
-}
-
-/// As [`by_passes`], all of them whatever valleys the profiles meet.
-pub(super) fn by_passes_from_here(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
-    along_trails(problem, at, uncertainty, None)
-}
-
-/// The profiles end at a point of a lower valley where that is asked for.
-fn along_trails(
-    problem: &Problem<'_>,
-    at: &Solution,
-    uncertainty: &Uncertainty,
-    lower: Option<&RefCell<Option<Solution>>>,
-) -> Intervals {
     let residuals = problem.samples.residuals();
     let is_large = residuals > SMALL;
     let is_rounding = at.cost <= ROUNDING * ROUNDING * residuals as f64;
     if is_rounding || is_large && (problem.cap.is_some() || !joint::has_few_parameters(problem)) {
-        return plain(problem, at, uncertainty);
+        return (plain(problem, at, uncertainty), None);
     }
     let (tolerance, tries) =
         if problem.samples.want_last_digits() { (CLOSE, TRIES) } else { (CLOSE_LARGE, TRIES_LARGE) };
     let fine = Fineness { resolved: RESOLVED * at.cost, tolerance, tries };
-    profiled(problem, at, uncertainty, fine, |i, rise| {
+    let lower = RefCell::new(None);
+    let intervals = profiled(problem, at, uncertainty, fine, |i, rise| {
         let mut trail = Trail::new(problem, at, &uncertainty.bread, i, 0.1 * tolerance * rise);
+        let lower = &lower;
         Box::new(move |value| {
-            let Some(lower) = lower else { return trail.cost(value) };
             let cost = if lower.borrow().is_some() { f64::NAN } else { trail.cost(value) };
-            if cost < at.cost - LOWER * rise {
+            if stops_at_lower && cost < at.cost - LOWER * rise {
                 lower.replace(Some(trail.at().clone()));
                 return f64::NAN;
             }
             cost
         })
-    })
+    });
+    (intervals, lower.into_inner())
 }
 
 /// The least cost as a function of one parameter's value.

@@ -205,17 +205,15 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
         (solution, met, found.report) = robust::settle(&mut problem, (&few, &more), solution, robust, options)?;
     }
     let mut judged = judge(&problem, &more, &start::ordered(&problem, solution), options)?;
-    let mut ends_here = true;
     for _ in 0..VALLEYS {
-        let Some(lower) = judged.lower.take() else { break };
-        let moved = robust::resettle(&problem, (&judged.solution, met), lower, options);
-        ends_here = moved.is_some();
-        let Some(moved) = moved else { break };
+        let Some(lower) = judged.lower.clone() else { break };
+        let Some(moved) = robust::resettle(&problem, (&judged.solution, met), lower, options) else { break };
         (problem.saturation, met) = (moved.saturation, moved.met);
         judged = judge(&problem, &more, &start::ordered(&problem, moved.at), options)?;
     }
-    if !ends_here || judged.lower.is_some() {
-        judged.intervals = intervals::by_passes_from_here(&problem, &judged.solution, &judged.uncertainty);
+    if judged.lower.is_some() {
+        // It stays here all the same: the profiles that were cut short there are followed.
+        judged.intervals = intervals::by_passes(&problem, &judged.solution, &judged.uncertainty, false).0;
     }
     let unsettled = if met { None } else { robust::left(&problem, &judged.solution, options) };
     found.outcome = judged.outcome;
@@ -248,7 +246,7 @@ fn judge(
     part.saturation = problem.saturation;
     identify::by_passes(&part, &solution, &mut uncertainty);
     let solution = Solution { cost: uncertainty.cost, ..solution };
-    let (intervals, lower) = intervals::by_passes(problem, &solution, &uncertainty);
+    let (intervals, lower) = intervals::by_passes(problem, &solution, &uncertainty, true);
     Ok(Judged { solution, outcome, uncertainty, intervals, lower })
 }
 

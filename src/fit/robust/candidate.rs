@@ -44,17 +44,10 @@ impl Ranking {
         let residuals = problem.samples.residuals() as f64;
         let margin = 1.0 + MARGIN / residuals.sqrt();
         let s = JUDGE_SCALE * margin * least;
-        let judged = |c: Candidate| {
-            let cost = bounded_cost(problem.samples, &c.at, s);
-            (c, cost)
-        };
-        let list = list.into_iter().map(judged).filter(|(c, cost)| c.sigma.is_finite() && cost.is_finite()).collect();
+        let costs = list.iter().map(|c| bounded_cost(problem.samples, &c.at, s)).collect::<Vec<f64>>();
+        let judged = list.into_iter().zip(costs);
+        let list = judged.filter(|(c, cost)| c.sigma.is_finite() && cost.is_finite()).collect();
         Self { list, tolerance: ALIKE * residuals }
-    }
-
-    /// How many are left.
-    pub fn len(&self) -> usize {
-        self.list.len()
     }
 
     /// Takes the best out, and all that are alike to it; says how many that were. Of alike ones the last is the best; one whose s has not settled
@@ -72,7 +65,7 @@ impl Ranking {
 
     /// Takes the best, and tells where the others ended.
     pub fn settle(mut self) -> Option<(Candidate, SearchReport)> {
-        let starts = self.len();
+        let starts = self.list.len();
         let (best, reached) = self.take()?;
         let minima = 1 + std::iter::from_fn(|| self.take()).count();
         Some((best, SearchReport { starts, reached, minima, ..SearchReport::default() }))

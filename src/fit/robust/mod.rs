@@ -37,8 +37,8 @@ struct Aim {
     digits: Digits,
 }
 
-/// On small tables; on others, where each round takes passes and the parameters' own errors are far larger; on the part of the samples that
-/// says where to begin.
+/// On small tables; on others and in the rounds of a budget, where each round takes passes and the parameters' own errors are far larger; on the
+/// part of the samples that says where to begin.
 const CLOSELY: Aim = Aim { tolerance: 1e-12, digits: Digits::All };
 const LARGE: Aim = Aim { tolerance: 1e-7, digits: Digits::Rough };
 const ROUGHLY: Aim = Aim { tolerance: 1e-3, digits: Digits::Rough };

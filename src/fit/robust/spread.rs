@@ -30,14 +30,7 @@ pub(super) fn telling_spread(samples: &Samples<'_>, at: &Solution, common: Optio
 /// whatever that makes of the others.
 pub(super) fn common_value(problem: &Problem<'_>) -> Option<f64> {
     let step = problem.samples.len().div_ceil(ENOUGH).max(1);
-    let some = problem.samples.listed(|i| i % step == 0);
-    let pieces = some.map_pieces(Vec::new, |list: &mut Vec<f64>, block| {
-        for c in 0..problem.ranges.len() {
-            let counting = block.y[c].iter().zip(block.weight(c)).filter(|(_, w)| **w > 0.0);
-            list.extend(counting.map(|(y, _)| *y));
-        }
-    });
-    let mut values = pieces.concat();
+    let mut values = values(&problem.samples.listed(|i| i % step == 0));
     values.sort_by(f64::total_cmp);
     let longest = values.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
     (4 * longest.len() >= values.len() && longest.len() < values.len()).then(|| longest[0])
@@ -67,14 +60,20 @@ pub(in crate::fit) fn sizes(samples: &Samples<'_>, like: &Solution) -> (f64, f64
 
 /// Median size of the values, where that is not 0.
 pub(super) fn typical(problem: &Problem<'_>) -> f64 {
-    let samples = problem.samples;
+    let mut sizes = values(problem.samples);
+    sizes.iter_mut().for_each(|y| *y = y.abs());
+    let size = median(&mut sizes);
+    if size > 0.0 { size } else { 1.0 }
+}
+
+/// The values that count.
+fn values(samples: &Samples<'_>) -> Vec<f64> {
     let pieces = samples.map_pieces(Vec::new, |list: &mut Vec<f64>, block| {
-        for c in 0..problem.ranges.len() {
-            list.extend(block.y[c].iter().zip(block.weight(c)).filter(|(_, w)| **w > 0.0).map(|(y, _)| y.abs()));
+        for c in 0..samples.channels.len() {
+            list.extend(block.y[c].iter().zip(block.weight(c)).filter(|(_, w)| **w > 0.0).map(|(y, _)| *y));
         }
     });
-    let size = median(&mut pieces.into_iter().flatten().collect::<Vec<f64>>());
-    if size > 0.0 { size } else { 1.0 }
+    pieces.concat()
 }
 
 /// Σ w ρ(r/s) with Tukey's bisquare, 1 − (1 − r²/s²)³ up to s and 1 beyond: however far off a residual is, it costs its weight at most.
