@@ -44,9 +44,8 @@ pub(super) fn is_at_end(problem: &Problem<'_>, at: &Solution, uncertainty: &Unce
 /// Estimate ± t·σ of every parameter, cut to its range; none for a shape at an end of it.
 pub(super) fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
     let around = |i: usize| {
-        let error = uncertainty.errors[i].filter(|_| !is_at_end(problem, at, uncertainty, i))?;
+        let reach = uncertainty.half_width(i).filter(|_| !is_at_end(problem, at, uncertainty, i))?;
         let (value, (low, high)) = parameter(problem, at, i);
-        let reach = uncertainty.reach[i] * error;
         Some(((value - reach).max(low), (value + reach).min(high)))
     };
     (0..uncertainty.errors.len()).map(around).collect()
@@ -105,9 +104,8 @@ fn profiled<'a>(
 ) -> Intervals {
     let mut intervals = plain(problem, at, uncertainty);
     for (i, interval) in intervals.iter_mut().enumerate() {
-        let Some(error) = uncertainty.errors[i] else { continue };
+        let Some(reach) = uncertainty.half_width(i) else { continue };
         let (value, (low, high)) = parameter(problem, at, i);
-        let reach = uncertainty.reach[i] * error;
         let rise = reach * reach / uncertainty.bread[(i, i)];
         let is_resolved = rise.is_finite() && rise > fine.resolved;
         if low == high || !is_resolved || !differs(problem, at, uncertainty, i) {
@@ -126,7 +124,7 @@ fn profiled<'a>(
 /// Whether the profile of parameter `i` may differ from a parabola.
 fn differs(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty, i: usize) -> bool {
     let (value, (low, high)) = parameter(problem, at, i);
-    let reach = uncertainty.reach[i] * uncertainty.errors[i].unwrap_or(0.0);
+    let reach = uncertainty.half_width(i).unwrap_or(0.0);
     if i >= at.weights.len() * problem.kinds.len() {
         return reach > NARROW || is_at_end(problem, at, uncertainty, i);
     }

@@ -1,10 +1,10 @@
 //! Does the fit follow the mean of the data? A loss that is not linear in the measured value, or weights that follow its noise, pull a
 //! fit off the mean, by more than its standard errors where the noise is not small. The residuals tell.
 //!
-//! *Weights by σ:* each residual is weighed anew by its neighbour's w, which is about as good as its own and knows nothing of its noise. By what
+//! *Weights by σ:* each residual is weighed anew by its neighbours' w, which is about as good as its own and knows nothing of its noise. By what
 //! the weighted residuals change their sum over each parameter's slope is off 0: that is chance of both signs, unless w follows the noise.
 //! *Losses that bend:* if the model can describe the data the sums Σ W φ (f − y) are 0 within their own scatter for any W that knows
-//! nothing of the noise: the neighbour's w c², and w times the loss's squared slope at the model's value, which is what the fit itself would
+//! nothing of the noise: the neighbours' w c², and w times the loss's squared slope at the model's value, which is what the fit itself would
 //! weigh by if there were no noise.
 
 use nalgebra::DVector;
@@ -19,14 +19,13 @@ const CLEARLY_OFF: f64 = 3.5;
 
 /// How a fit is off the mean of its data.
 pub(super) struct Offset {
-    /// By how many standard deviations.
-    pub score: f64,
-    /// What weights that follow the noise add to half the cost's gradient, by all parameters; 0 where they don't.
+    /// By how many standard deviations, where that is no chance.
+    pub score: Option<f64>,
+    /// What weights that follow the noise add to half the cost's gradient, by all parameters, less what chance does.
     pub pull: DVector<f64>,
 }
 
-/// How the fit is off the mean; `None` where what is seen may be chance, and for fits that follow the mean by construction or are not
-/// meant to.
+/// How the fit is off the mean; `None` for fits that follow the mean by construction or are not meant to.
 pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<Offset> {
     let samples = problem.samples;
     let bends = !samples.loss.is_linear() || samples.loss == Loss::Relative;
@@ -64,9 +63,13 @@ pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<Offset> {
     };
     let follow = sums.follow.iter().map(|s| score(*s)).fold(0.0, f64::max);
     let mean = (0..sums.mean.len()).filter(free).flat_map(|k| sums.mean[k].map(score)).fold(0.0, f64::max);
-    let clearly = if follow > CLEARLY_OFF { 1.0 } else { 0.0 };
-    let pull = DVector::from_iterator(parameters, sums.follow.iter().map(|s| clearly * s.0));
-    Some(Offset { score: follow.max(mean), pull }).filter(|offset| offset.score > CLEARLY_OFF)
+    let score = Some(follow.max(mean)).filter(|score| *score > CLEARLY_OFF);
+    Some(Offset { score, pull: DVector::from_iterator(parameters, sums.follow.iter().map(|s| beyond_chance(*s))) })
+}
+
+/// A sum less what chance makes of it: of g with E g² = S + b², S the sum of the terms' squares, what is left is b.
+fn beyond_chance((sum, square): Sum) -> f64 {
+    if sum * sum > square { sum * (1.0 - square / (sum * sum)).sqrt() } else { 0.0 }
 }
 
 /// A sum and that of its terms' squares.
@@ -78,7 +81,7 @@ fn score((sum, square): Sum) -> f64 {
 
 #[derive(Clone)]
 struct Sums {
-    /// By each parameter: Σ (w′/w − 1) · pull · slope, w′ the neighbour's.
+    /// By each parameter: Σ (w′/w − 1) · pull · slope, w′ the neighbours'.
     follow: Vec<Sum>,
     /// Of each channel's lobes: Σ W φ (f − y) for two kinds of W.
     mean: Vec<[Sum; 2]>,
@@ -95,7 +98,10 @@ impl Sums {
         let (place, strength) = (problem.place(at.weights.len(), channel), problem.strength(&at.weights[channel]));
         let w = block.weight(channel);
         for i in (0..block.len()).filter(|&i| w[i] > 0.0) {
-            let Some(other) = neighbour(block, i).map(|k| w[k]).filter(|w| *w > 0.0) else { continue };
+            let other = beside(block, w, i);
+            if other == 0.0 {
+                continue;
+            }
             let more = (other / w[i] - 1.0) * scratch.pull[i];
             for ((column, strength), place) in scratch.columns.iter().zip(&strength).zip(&place) {
                 add(&mut self.follow[*place], more * strength * column[i]);
@@ -110,7 +116,7 @@ impl Sums {
             let (f, cos_i) = (scratch.f[i], block.cos_i[i]);
             let as_modelled = Datum { value: f, cos_i, epsilon: samples.epsilon[channel] };
             let own = w[i] * samples.loss.slope(f, as_modelled).powi(2);
-            let others = neighbour(block, i).map_or(0.0, |k| w[k] * cos_i * cos_i);
+            let others = beside(block, w, i) * cos_i * cos_i;
             for (l, sums) in self.mean[channel * lobes..(channel + 1) * lobes].iter_mut().enumerate() {
                 let term = scratch.columns[l][i] * (f - y[i]);
                 add(&mut sums[0], others * term);
@@ -125,10 +131,9 @@ fn add(to: &mut Sum, term: f64) {
     *to = (to.0 + term, to.1 + term * term);
 }
 
-/// A sample beside sample `i` of a block.
-fn neighbour(block: &Block, i: usize) -> Option<usize> {
-    if block.pairs[i] > 0.0 && i > 0 {
-        return Some(i - 1);
-    }
-    block.pairs.get(i + 1).filter(|pair| **pair > 0.0).map(|_| i + 1)
+/// What the weight of sample `i` of a block should be by those of its two neighbours: their geometric mean, in which a trend cancels; 0 where one
+/// is missing.
+fn beside(block: &Block, w: &[f64], i: usize) -> f64 {
+    let within = block.pairs[i] > 0.0 && i > 0 && block.pairs.get(i + 1).is_some_and(|pair| *pair > 0.0);
+    if within { (w[i - 1] * w[i + 1]).sqrt() } else { 0.0 }
 }

@@ -55,6 +55,8 @@ pub(super) struct Uncertainty {
     pub by_others: Vec<usize>,
     /// Half width of each parameter's 95 % interval over its standard error: Student's t, and what leverage asks for.
     pub reach: Vec<f64>,
+    /// By how far weights that follow the noise move each parameter, beyond what chance explains.
+    pub moved: DVector<f64>,
 }
 
 /// Standard errors at a solution. `moments` are the sums of A where they are known.
@@ -82,7 +84,7 @@ pub(super) fn uncertainty(
     let leaning = totals.outliers.lean(&sandwich.bread).then_some(totals.outliers.count);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
-    let (mut reach, by_others) = match leveraged {
+    let (reach, by_others) = match leveraged {
         Some(leveraged) => {
             let certain = sandwich.covariance(&totals.known, &shared).diagonal();
             (leveraged.reach(&certain, &covariance.diagonal(), freedom), leveraged.by_others(&certain))
@@ -90,11 +92,7 @@ pub(super) fn uncertainty(
         None => (vec![student_quantile(0.975, freedom.max(1.0)); pinned.len()], Vec::new()),
     };
     let offset = offset::offset(problem, at);
-    if let Some(offset) = &offset {
-        let moved = &sandwich.bread * &offset.pull;
-        let wider = |i: usize| (1.0 + moved[i] * moved[i] / covariance[(i, i)]).sqrt();
-        reach.iter_mut().enumerate().for_each(|(i, r)| *r *= if moved[i] == 0.0 { 1.0 } else { wider(i) });
-    }
+    let moved = offset.as_ref().map_or(DVector::zeros(pinned.len()), |offset| &sandwich.bread * &offset.pull);
     let (clusters, count) = (totals.clusters.0, totals.clusters.1 as f64);
     let grouped = sandwich.covariance(&(clusters * (count / (count - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&totals.drawn, &[]);
@@ -111,10 +109,19 @@ pub(super) fn uncertainty(
         bread: sandwich.bread,
         neighbours: totals.neighbours,
         stated: totals.stated,
-        offset: offset.map(|offset| offset.score),
+        offset: offset.and_then(|offset| offset.score),
         leaning,
         by_others,
         reach,
+        moved,
+    }
+}
+
+impl Uncertainty {
+    /// Half width of the 95 % interval of parameter `i`: the noise, and by how far weights that follow it move the estimate. `None` where the data
+    /// don't determine it.
+    pub fn half_width(&self, i: usize) -> Option<f64> {
+        self.errors[i].map(|error| self.reach[i] * error.hypot(self.moved[i]))
     }
 }
 

@@ -44,17 +44,24 @@ impl Block {
         if self.w.len() == 1 { &self.w[0] } else { &self.w[channel] }
     }
 
-    /// The samples ordered by direction, so that neighbours stand together and the order of the file does not matter.
+    /// The samples ordered by direction, so that neighbours stand together and the order of the file does not matter: along rings about the
+    /// normal, or along meridians where rings hold few.
     pub fn neighbours_together(&self, wi: &[DVec3], wo: &[DVec3]) -> Self {
-        let mut order: Vec<([i32; 4], u32)> = (0..self.len() as u32)
-            .into_par_iter()
-            .map(|k| {
+        let by = |of: fn(DVec3) -> [i32; 2]| {
+            let key = |k: u32| {
                 let entry = self.index[k as usize] as usize;
-                let ([a, b], [c, d]) = (place(wi[entry]), place(wo[entry]));
+                let ([a, b], [c, d]) = (on_ring(wi[entry]), of(wo[entry]));
                 ([a, b, c, d], k)
-            })
-            .collect();
-        order.par_sort_unstable();
+            };
+            let mut order: Vec<([i32; 4], u32)> = (0..self.len() as u32).into_par_iter().map(key).collect();
+            order.par_sort_unstable();
+            order
+        };
+        let mut order = by(on_ring);
+        let rings = order.chunk_by(|(a, _), (b, _)| a[..3] == b[..3]).count();
+        if order.len() < FEW_ON_RING * rings {
+            order = by(on_meridian);
+        }
         let pick = |list: &Vec<f64>| order.iter().map(|(_, k)| list[*k as usize]).collect();
         let index: Vec<u32> = order.iter().map(|(_, k)| self.index[*k as usize]).collect();
         Self {
@@ -101,14 +108,30 @@ pub(super) fn next_on_line(a: usize, b: usize) -> bool {
     b == a + 1 && !b.is_multiple_of(MerlGrid::PHI_D)
 }
 
-/// A direction's polar ring and its place on it, coarse enough to overlook rounding.
-fn place(w: DVec3) -> [i32; 2] {
-    const STEPS: f64 = 1e5;
-    // The azimuth by the way round a square: monotone, and cheaper than an arctangent.
+/// Places on a line of unit length that are told apart: coarse enough to overlook rounding.
+const STEPS: f64 = 1e5;
+/// A scan whose rings hold fewer directions than this runs along meridians: a plane has two on each.
+const FEW_ON_RING: usize = 3;
+
+/// A direction's polar ring and its place on it.
+fn on_ring(w: DVec3) -> [i32; 2] {
+    [(w.z * STEPS).round() as i32, (azimuth(w) * STEPS).round() as i32]
+}
+
+/// A direction's plane through the normal and its place along it.
+fn on_meridian(w: DVec3) -> [i32; 2] {
+    let half_turn = 2 * STEPS as i32;
+    let azimuth = (azimuth(w) * STEPS).round() as i32;
+    let from_pole = ((1.0 - w.z) * STEPS).round() as i32;
+    let is_behind = azimuth.div_euclid(half_turn) % 2 != 0;
+    [azimuth.rem_euclid(half_turn), if is_behind { -from_pole } else { from_pole }]
+}
+
+/// The azimuth by the way round a square, −1 to 3: monotone, 2 for half a turn, and cheaper than an arctangent.
+fn azimuth(w: DVec3) -> f64 {
     let size = w.x.abs() + w.y.abs();
     let round = if size > 1e-9 { w.y / size } else { 0.0 };
-    let round = if w.x < 0.0 { 2.0 - round } else { round };
-    [(w.z * STEPS).round() as i32, (round * STEPS).round() as i32]
+    if w.x < 0.0 { 2.0 - round } else { round }
 }
 
 /// Values over their unit and their weights, both 0 where the value is masked.
@@ -144,5 +167,28 @@ mod tests {
             [0., 1., 0., 0., 1., 0., 1.]
         );
         assert!(neighbours(&[], next_on_line).is_empty());
+    }
+
+    /// An in-plane scan runs through the pole from one azimuth to the other, whichever plane it lies in; a grid runs round the rings.
+    #[test]
+    fn a_plane_s_directions_are_neighbours_through_the_pole() {
+        let towards = |theta: f64, phi: f64| {
+            let ((s, c), (sin, cos)) = (theta.to_radians().sin_cos(), phi.to_radians().sin_cos());
+            DVec3::new(s * cos, s * sin, c)
+        };
+        let pairs = |wo: &[DVec3]| {
+            let n = wo.len();
+            let block = Block { index: (0..n as u32).collect(), pairs: vec![0.0; n], ..Block::default() };
+            let block = Block { cos_i: vec![1.0; n], x: vec![0.0; n], ..block };
+            block.neighbours_together(&vec![towards(30.0, 0.0); n], wo).pairs.iter().sum::<f64>()
+        };
+        let ring = |theta: f64, azimuths: &[f64]| azimuths.iter().map(|p| towards(theta, *p)).collect::<Vec<_>>();
+        for plane in [0.0, 30.0, 90.0, 117.0, 180.0, 300.0] {
+            let wo: Vec<_> = (1..18).flat_map(|k| ring(5.0 * f64::from(k), &[plane, plane + 180.0])).collect();
+            assert_eq!(pairs(&wo), 33.0, "azimuth {plane}");
+        }
+        let azimuths: Vec<f64> = (0..36).map(|k| 10.0 * f64::from(k)).collect();
+        let grid: Vec<_> = (1..9).flat_map(|k| ring(10.0 * f64::from(k), &azimuths)).collect();
+        assert!(pairs(&grid) >= 8.0 * 35.0);
     }
 }
