@@ -5,7 +5,8 @@
 //! the weighted residuals change their sum over each parameter's slope is off 0: that is chance of both signs, unless w follows the noise.
 //! *Losses that bend:* if the model can describe the data the sums Σ W φ (f − y) are 0 within their own scatter for any W that knows
 //! nothing of the noise: the neighbours' w c², and w times the loss's squared slope at the model's value, which is what the fit itself would
-//! weigh by if there were no noise.
+//! weigh by if there were no noise. Under a robust loss errors count as little as it lets them, by the slope at the model's value, and gross
+//! outliers not at all: what is 0 then is the sum of noise that is as likely to be high as low.
 
 use nalgebra::DVector;
 
@@ -25,12 +26,12 @@ pub(super) struct Offset {
     pub pull: DVector<f64>,
 }
 
-/// How the fit is off the mean; `None` for fits that follow the mean by construction or are not meant to.
-pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<Offset> {
+/// How the fit is off the mean, residuals beyond `gross` being outliers; `None` for fits that follow the mean by construction or are not meant to.
+pub(super) fn offset(problem: &Problem<'_>, at: &Solution, gross: f64) -> Option<Offset> {
     let samples = problem.samples;
     let bends = !samples.loss.is_linear() || samples.loss == Loss::Relative;
     let by_sigma = samples.weighting == "sigma";
-    if problem.saturation.is_some() || !(bends || by_sigma) {
+    if !(bends || by_sigma) {
         return None;
     }
     let channels = at.weights.len();
@@ -42,12 +43,12 @@ pub(super) fn offset(problem: &Problem<'_>, at: &Solution) -> Option<Offset> {
         |(sums, scratch), block| {
             scratch.basis(&block.x, &at.lobes);
             for c in 0..channels {
-                scratch.residuals(samples, block, c, &at.weights[c], None);
+                scratch.residuals(samples, block, c, &at.weights[c], problem.saturation);
                 if by_sigma {
                     sums.follow(problem, at, block, c, scratch);
                 }
                 if bends {
-                    sums.mean(problem, block, c, scratch);
+                    sums.mean(problem, block, c, scratch, gross);
                 }
             }
         },
@@ -109,16 +110,22 @@ impl Sums {
         }
     }
 
-    fn mean(&mut self, problem: &Problem<'_>, block: &Block, channel: usize, scratch: &Scratch) {
+    fn mean(&mut self, problem: &Problem<'_>, block: &Block, channel: usize, scratch: &Scratch, gross: f64) {
         let (samples, lobes) = (problem.samples, problem.kinds.len());
+        let trust = |r: f64| match problem.saturation {
+            Some((kind, s)) if r.abs() <= gross => kind.rho((r / s).powi(2)).1,
+            Some(_) => 0.0,
+            None => 1.0,
+        };
         let (w, y) = (block.weight(channel), &block.y[channel]);
         for i in (0..block.len()).filter(|&i| w[i] > 0.0) {
             let (f, cos_i) = (scratch.f[i], block.cos_i[i]);
             let as_modelled = Datum { value: f, cos_i, epsilon: samples.epsilon[channel] };
-            let own = w[i] * samples.loss.slope(f, as_modelled).powi(2);
-            let others = beside(block, w, i) * cos_i * cos_i;
+            let slope = samples.loss.slope(f, as_modelled);
+            let (own, others) = (w[i] * slope * slope, beside(block, w, i) * cos_i * cos_i);
+            let trusted = trust(slope * (f - y[i])) * (f - y[i]);
             for (l, sums) in self.mean[channel * lobes..(channel + 1) * lobes].iter_mut().enumerate() {
-                let term = scratch.columns[l][i] * (f - y[i]);
+                let term = scratch.columns[l][i] * trusted;
                 add(&mut sums[0], others * term);
                 // An infinite slope has no say.
                 add(&mut sums[1], if own.is_finite() { own * term } else { 0.0 });

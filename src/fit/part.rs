@@ -67,7 +67,7 @@ impl Part {
         (dark.samples, dark.counts, dark.refused) = (0, vec![0; channels.len()], 0);
         dark.solution.cost = 0.0;
         dark.uncertainty.errors.fill(None);
-        (dark.uncertainty.leaning, dark.uncertainty.by_others, dark.unsettled) = (None, Vec::new(), None);
+        (dark.uncertainty.outliers, dark.uncertainty.by_others, dark.unsettled) = Default::default();
         dark.uncertainty.structured.fill(0.0);
         dark.intervals.fill(None);
         for (own, &channel) in channels.iter().enumerate() {

@@ -379,3 +379,22 @@ fn a_robust_search_says_how_many_starts_ended_where() {
         assert!(search.minima >= 1 && search.reached + search.minima <= search.starts + 1, "{search:?}");
     }
 }
+
+/// Values that the model can't follow are outliers of a robust fit, and told from stray readings by standing side by side.
+#[test]
+fn outliers_that_stand_side_by_side_are_told_from_stray_ones() {
+    let said = |m: &Measurement, kind: RobustKind, model: &str| {
+        let o = FitOptions { robust: Some(Robust { kind, scale: kind.default_scale() }), ..options(model) };
+        record(&solved(m, &o)).warnings.iter().any(|w| w.contains("side by side"))
+    };
+    let instrument = Instrument { electrons: 1e6, ..Instrument::default() };
+    let lobe = measure(&material(&[0.2], &[0.1], 30.0), &instrument, &HEMISPHERE(10.0), 1);
+    for kind in RobustKind::ALL {
+        assert!(said(&lobe, kind, "lambert"), "{kind:?}");
+        assert!(!said(&lobe, kind, "lambert+phong"), "{kind:?}");
+        for seed in 0..30 {
+            assert!(!said(&leaning(seed, 0.05 + 0.01 * (seed % 20) as f64), kind, "lambert+phong"), "{kind:?} {seed}");
+            assert!(!said(&spoilt(seed), kind, "lambert+phong"), "{kind:?} {seed}");
+        }
+    }
+}

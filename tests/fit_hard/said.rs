@@ -1,9 +1,10 @@
 //! What a fit must say of itself: numbers that can't be trusted are named, and no number is made up.
 
-use goniofit::fit::{FitOptions, Limit, Loss, fit};
+use goniofit::fit::{FitOptions, Limit, Loss, Robust, RobustKind, fit};
 use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::{Directions, Measurement};
 
+use crate::experiment::{Outliers, add_outliers};
 use crate::support::*;
 
 fn says(m: &goniofit::brdf::Material, words: &str) -> bool {
@@ -30,6 +31,20 @@ fn a_fit_that_noise_pulls_off_the_mean_says_so() {
                 says(&solved(&m, &FitOptions { loss, ..options("lambert+phong") }), "off the mean"),
                 "{loss:?} {seed}"
             );
+        }
+        for kind in RobustKind::ALL {
+            let robust = Some(Robust { kind, scale: kind.default_scale() });
+            let relative = |m| solved(m, &FitOptions { loss: Loss::Relative, robust, ..options("lambert+phong") });
+            let got = relative(&noisy(3e3, &scan, seed));
+            assert!(says(&got, "off the mean"), "relative {kind:?} {seed}: {:?}", record(&got).warnings);
+            // Where noise exceeds the values a model of 0 is off each by the factor 1: no scale tells anything then.
+            assert!(says(&relative(&m), "gross outliers"), "relative {kind:?} {seed}");
+            let (clean, mut spoilt) = (noisy(1e8, &scan, seed), noisy(1e8, &scan, seed));
+            add_outliers(&mut spoilt, Outliers::OneSided(0.05), &mut draws(seed));
+            for (m, loss) in [&clean, &spoilt].into_iter().flat_map(|m| [Loss::Relative, Loss::Log].map(|l| (m, l))) {
+                let got = solved(m, &FitOptions { loss, robust, ..options("lambert+phong") });
+                assert!(!says(&got, "off the mean"), "{loss:?} {kind:?} {seed}: {:?}", record(&got).warnings);
+            }
         }
         // Fits that follow the mean, and those whose noise is too small to matter, have nothing to say.
         for (m, loss) in [(&m, Loss::L2), (&m, Loss::CosineL2), (&noisy(1e9, &scan, seed), Loss::CubeRoot)] {

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use super::leverage::Leveraged;
 use super::loss::Robust;
 use super::offset;
+use super::outliers;
 use super::part::SMALL;
 use super::passes::Moments;
 use super::reduced::{Problem, Solution};
@@ -49,8 +50,8 @@ pub(super) struct Uncertainty {
     pub stated: (f64, usize),
     /// How clearly the fit is off the data's mean, in standard deviations, where it is.
     pub offset: Option<f64>,
-    /// Number of gross outliers, where they lean to one side.
-    pub leaning: Option<usize>,
+    /// Gross outliers under a robust loss.
+    pub outliers: outliers::Traits,
     /// Parameters whose error is for the most part that of samples which say nothing of their own noise.
     pub by_others: Vec<usize>,
     /// Half width of each parameter's 95 % interval over its standard error: Student's t, and what leverage asks for.
@@ -70,7 +71,8 @@ pub(super) fn uncertainty(
     let pinned = pinned(problem, at.weights.len());
     let freedom = n as f64 - pinned.iter().filter(|p| !**p).count() as f64;
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
-    let totals = Totals::gathered(problem, at, moments, robust);
+    let gross = outliers::gross(robust, problem.saturation.map_or(1.0, |(_, s)| s));
+    let totals = Totals::gathered(problem, at, moments, gross);
     let sandwich = Sandwich::new(&totals.normal, &pinned, &limited(problem, at, &pinned));
     let shared: Vec<_> = totals.common.iter().cloned().chain([totals.outliers.shared(&sandwich.bread)]).collect();
     let mut spread = &totals.known + &totals.by_residuals * inflation;
@@ -81,7 +83,6 @@ pub(super) fn uncertainty(
         spread += &leveraged.lone;
     }
     let covariance = sandwich.covariance(&spread, &shared);
-    let leaning = totals.outliers.lean(&sandwich.bread).then_some(totals.outliers.count);
     let mut errors = sandwich.errors(&covariance);
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
     let (reach, by_others) = match leveraged {
@@ -91,12 +92,13 @@ pub(super) fn uncertainty(
         }
         None => (vec![student_quantile(0.975, freedom.max(1.0)); pinned.len()], Vec::new()),
     };
-    let offset = offset::offset(problem, at);
+    let offset = offset::offset(problem, at, gross);
     let moved = offset.as_ref().map_or(DVector::zeros(pinned.len()), |offset| &sandwich.bread * &offset.pull);
     let (clusters, count) = (totals.clusters.0, totals.clusters.1 as f64);
     let grouped = sandwich.covariance(&(clusters * (count / (count - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&totals.drawn, &[]);
     let design_effect = (&totals.normal * &grouped).trace() / (&totals.normal * &drawn).trace();
+    let outliers = totals.outliers.traits(&sandwich.bread);
     Uncertainty {
         cost: totals.cost,
         dark: totals.dark,
@@ -110,7 +112,7 @@ pub(super) fn uncertainty(
         neighbours: totals.neighbours,
         stated: totals.stated,
         offset: offset.and_then(|offset| offset.score),
-        leaning,
+        outliers,
         by_others,
         reach,
         moved,

@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::folded::{OnLines, Products, Residuals};
-use crate::fit::loss::{Datum, Robust};
+use crate::fit::loss::Datum;
 use crate::fit::merl_lines::{Line, MerlLines};
-use crate::fit::outliers::{self, Outliers};
+use crate::fit::outliers::Outliers;
 use crate::fit::passes::{Moments, Scratch, project};
 use crate::fit::reduced::{Problem, Solution, spread_into};
 use crate::fit::samples::Block;
@@ -52,10 +52,9 @@ impl Totals {
         }
     }
 
-    /// All of them. `moments` are the sums of A where they are known; `robust` says from which residual one is a gross outlier.
-    pub fn gathered(problem: &Problem<'_>, at: &Solution, moments: Option<&Moments>, robust: Option<Robust>) -> Self {
+    /// All of them. `moments` are the sums of A where they are known; a residual beyond `gross` is a gross outlier.
+    pub fn gathered(problem: &Problem<'_>, at: &Solution, moments: Option<&Moments>, gross: f64) -> Self {
         let start = || Piece::new(problem, at);
-        let gross = outliers::gross(robust, problem.saturation.map_or(1.0, |(_, s)| s));
         let add = |piece: &mut Piece, block: &Block| piece.add(problem, at, block, moments.is_none(), gross);
         let add_lines =
             |piece: &mut Piece, lines: &MerlLines, block: &[Line]| piece.add_lines(problem, at, lines, block);
@@ -164,7 +163,7 @@ impl Piece {
             sums.neighbours.add(&Neighbours::of(&scratch.r, &scratch.trust, w, pairs));
             sums.dark |= block.x.iter().zip(w).any(|(x, w)| *x == f64::NEG_INFINITY && *w > 0.0);
             let gradient = sums.add(problem, block, c, scratch, bread);
-            sums.outliers.add(scratch, gross);
+            sums.outliers.add(scratch, (w, pairs), gross);
             let (strength, place) = (problem.strength(x), problem.place(channels, c));
             if clusters.len() == 1 {
                 place.iter().enumerate().for_each(|(i, p)| scores[0][*p] += strength[i] * gradient[i]);

@@ -4,6 +4,7 @@ use super::Facts;
 use crate::brdf::{FitRecord, LobeRecord, Material, PerChannel};
 use crate::fit::loss::Loss;
 use crate::fit::options::WeightMode;
+use crate::fit::outliers::Traits;
 use crate::fit::{energy, missing};
 
 /// Share of structure in the residuals' variance from which it is warned of.
@@ -128,11 +129,15 @@ impl Facts<'_> {
             } else {
                 ("this loss pulls", "neither standard errors nor intervals cover that")
             };
+            let follows = match self.options.robust {
+                Some(_) => "`--loss cosine-l2` without `--use-sigma` and `--robust`",
+                None => "`--loss cosine-l2` without `--use-sigma`",
+            };
             let misfit = record.residual.as_ref().is_some_and(|r| r.model_rmse > 0.0);
             let or = if misfit { " (or the model's own error, weighed differently, does)" } else { "" };
             list.push(format!(
                 "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away{or}; \
-                 {cover}; `--loss cosine-l2` without `--use-sigma` follows the mean"
+                 {cover}; {follows} follows the mean"
             ));
         }
         if let Some(residual) = record
@@ -146,12 +151,7 @@ impl Facts<'_> {
                 of_errors(record, ", and the standard errors with it")
             ));
         }
-        let leaning: usize = self.parts.iter().filter_map(|p| p.uncertainty.leaning).sum();
-        if leaning > 0 {
-            list.push(format!(
-                "{leaning} values are gross outliers and lean to one side: what they still pull is in the standard errors as one shared error"
-            ));
-        }
+        list.extend(self.outlier_warnings());
         if let Some(left) = self.parts.iter().filter_map(|p| p.unsettled).max_by(|a, b| a.abs().total_cmp(&b.abs())) {
             list.push(unsettled_warning(left));
         }
@@ -161,6 +161,29 @@ impl Facts<'_> {
                  neighbours, and no σ is stated for all of them"
                     .into(),
             );
+        }
+        list
+    }
+
+    /// What gross outliers tell and do.
+    fn outlier_warnings(&self) -> Vec<String> {
+        let counted = |of: fn(&Traits) -> bool| {
+            let traits = self.parts.iter().map(|p| &p.uncertainty.outliers).filter(|t| of(t));
+            traits.fold((0, 0), |(count, all), t| (count + t.count, all + t.of))
+        };
+        let mut list = Vec::new();
+        let (count, of) = counted(|t| t.stand_together);
+        if count > 0 {
+            list.push(format!(
+                "{count} of {of} values are gross outliers and stand side by side, which stray readings do not: the model does not describe \
+                 these data there, or a part of the scan is wrong; the standard errors do not cover that"
+            ));
+        }
+        let (count, _) = counted(|t| t.lean);
+        if count > 0 {
+            list.push(format!(
+                "{count} values are gross outliers and lean to one side: what they still pull is in the standard errors as one shared error"
+            ));
         }
         list
     }
