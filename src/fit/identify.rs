@@ -80,8 +80,8 @@ fn mark(
     // A lobe whose weights may all be 0 may stand anywhere.
     let unproved = |lobe: usize| {
         let may_be_0 = |c: usize| {
-            let error = uncertainty.errors[c * lobes + lobe].unwrap_or(f64::INFINITY);
-            problem.ranges[c][lobe].0 == 0.0 && at.weights[c][lobe] <= uncertainty.reach[c * lobes + lobe] * error
+            let reach = uncertainty.half_width(c * lobes + lobe).unwrap_or(f64::INFINITY);
+            problem.ranges[c][lobe].0 == 0.0 && at.weights[c][lobe] <= reach
         };
         (0..channels).all(may_be_0)
     };

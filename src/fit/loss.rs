@@ -61,6 +61,12 @@ impl Loss {
         matches!(self, Self::L2 | Self::CosineL2 | Self::Relative)
     }
 
+    /// Whether r is not linear in the measured value, so that noise pulls a fit off its mean.
+    #[must_use]
+    pub fn bends(self) -> bool {
+        !matches!(self, Self::L2 | Self::CosineL2)
+    }
+
     /// Whether the residual is defined for this value.
     #[must_use]
     pub fn accepts(self, datum: Datum) -> bool {

@@ -15,12 +15,11 @@ pub(super) struct Outliers {
     pull: DVector<f64>,
     /// S.
     squares: DMatrix<f64>,
-    /// How many there are.
-    pub count: usize,
-    /// Of how many values that count.
-    pub of: usize,
-    /// How many neighbours are both gross, to the same side, and how many pairs there are.
-    together: (usize, usize),
+    /// How many there are, and of how many values that count.
+    count: usize,
+    of: usize,
+    /// Neighbours that are both gross to the same side, less those to opposite ones, and how many pairs there are.
+    together: (isize, usize),
 }
 
 impl Outliers {
@@ -37,6 +36,9 @@ impl Outliers {
     /// Adds those of one channel of a block, whose residuals and columns are there: residuals beyond `gross`. With the samples' weights, and which
     /// are neighbours of the one before.
     pub fn add(&mut self, scratch: &mut Scratch, (w, pairs): (&[f64], &[f64]), gross: f64) {
+        if gross == f64::INFINITY {
+            return;
+        }
         let outlier = |(r, pull): (&f64, &f64)| if r.abs() > gross { *pull } else { 0.0 };
         let pulls: Vec<f64> = scratch.r.iter().zip(&scratch.pull).map(outlier).collect();
         let paired = |i: &usize| pairs[*i] > 0.0 && w[i - 1] > 0.0 && w[*i] > 0.0;
@@ -47,7 +49,12 @@ impl Outliers {
             return;
         }
         self.count += found;
-        self.together.0 += (1..w.len()).filter(paired).filter(|&i| pulls[i - 1] * pulls[i] > 0.0).count();
+        let alike = |i: usize| match pulls[i - 1] * pulls[i] {
+            0.0 => 0,
+            product if product > 0.0 => 1,
+            _ => -1,
+        };
+        self.together.0 += (1..w.len()).filter(paired).map(alike).sum::<isize>();
         project(&scratch.columns, &pulls, &mut self.pull);
         scratch.weight = pulls.iter().map(|p| p * p).collect();
         scratch.tally(self.pull.len(), &mut self.pull.map(|_| 0.0), &mut self.squares);
@@ -97,7 +104,7 @@ pub(super) struct Traits {
 }
 
 /// Gross outliers stand together from this many pairs of neighbours on, and from this correlation of being one on.
-const TOGETHER: (usize, f64) = (10, 0.3);
+const TOGETHER: (isize, f64) = (10, 0.3);
 
 /// A residual of more σ than this is a gross outlier: no noise reaches it.
 const GROSS: f64 = 9.5;

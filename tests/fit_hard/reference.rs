@@ -194,6 +194,7 @@ impl Reference {
         let (squares, expected) =
             rows.iter().fold((0.0, 0.0), |sum, (pull, _, m, rest)| (sum.0 + pull * pull, sum.1 + m * rest));
         let (q, freedom) = (squares / expected, rows.iter().map(|row| row.3).sum::<f64>());
+        let bent = inverse * self.bent(p, robust);
         let half_width = |j: usize| {
             let (mut variance, mut mean, mut scatter, mut filled) = (0.0, 0.0, 0.0, 0.0);
             for (pull, moved, m, rest) in &rows {
@@ -205,9 +206,23 @@ impl Reference {
             }
             scatter += filled * filled / freedom;
             let freedom = (mean * mean / scatter).min((self.values.len() - p.len()) as f64);
-            student_quantile(0.975, freedom) * variance.sqrt()
+            (student_quantile(0.975, freedom) * variance.sqrt()).hypot(1.959_963_984_540_054 * bent[j])
         };
         (0..p.len()).map(half_width).collect()
+    }
+
+    /// By what the pulls add up otherwise with the loss's slope at the model's value in place of that between model and data, less what chance does.
+    fn bent(&self, p: &[f64], robust: Option<(RobustKind, f64)>) -> DVector<f64> {
+        let trust = |r: f64| robust.map_or(1.0, |(kind, s)| rho(kind, (r / s).powi(2)).1);
+        let (mut sum, mut squares) = (DVector::<f64>::zeros(p.len()), DVector::<f64>::zeros(p.len()));
+        for v in &self.values {
+            let (r, slope) = (self.residual(p, v), self.slope(p, v));
+            let straight = slope * (self.model(p, v) - v.y);
+            let term = v.w * slope * (trust(straight) * straight - trust(r) * r) * self.columns(p, v);
+            squares += term.component_mul(&term);
+            sum += term;
+        }
+        sum.zip_map(&squares, |g, s| if g * g > s { g * (1.0 - s / (g * g)).sqrt() } else { 0.0 })
     }
 
     /// Of a value: w ρ′ r ∂r/∂f, A⁻¹ ∂f, (w ρ′ ∂r/∂f)², 1 − h.

@@ -125,7 +125,6 @@ fn evidence(record: &FitRecord, material: &Material) -> String {
     if let Some(r) = &record.residual {
         let from = if r.noise_from == "sigma" { "as the file states" } else { "from neighbours" };
         let model = match r.model_rmse {
-            0.0 if record.robust.is_some() => "no model error seen beside outliers".into(),
             0.0 => "no model error seen".into(),
             rmse => format!("model error {}{unit}", small(rmse, 2)),
         };

@@ -19,6 +19,15 @@ use sandwich::Sandwich;
 use sums::Totals;
 pub(super) use sums::{data_slopes, stated_errors};
 
+/// Share of structure in the residuals' variance from which it is warned of.
+pub(super) const STRUCTURED: f64 = 0.25;
+/// Share of A's least eigenvalue, scaled, below which it is lost.
+const LOST: f64 = 0.5;
+/// Half width of a normal variable's 95 % interval over its standard deviation.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+/// Standard errors from which it is worth a word that a fit is off the mean.
+const MATERIAL: f64 = 0.5;
+
 /// A 95 % interval.
 pub type Interval = (f64, f64);
 
@@ -48,7 +57,7 @@ pub(super) struct Uncertainty {
     pub neighbours: Neighbours,
     /// Σ w σ_r² over samples and channels with a stated σ, and how many there are.
     pub stated: (f64, usize),
-    /// How clearly the fit is off the data's mean, in standard deviations, where it is.
+    /// By how many of its standard errors a parameter is off where a fit that follows the data's mean has it, where that matters.
     pub offset: Option<f64>,
     /// Gross outliers under a robust loss.
     pub outliers: outliers::Traits,
@@ -56,7 +65,7 @@ pub(super) struct Uncertainty {
     pub by_others: Vec<usize>,
     /// Half width of each parameter's 95 % interval over its standard error: Student's t, and what leverage asks for.
     pub reach: Vec<f64>,
-    /// By how far weights that follow the noise move each parameter, beyond what chance explains.
+    /// By how far weights that follow the noise, or a loss that bends, move each parameter, beyond what chance explains.
     pub moved: DVector<f64>,
 }
 
@@ -72,11 +81,17 @@ pub(super) fn uncertainty(
     let freedom = n as f64 - pinned.iter().filter(|p| !**p).count() as f64;
     let inflation = if freedom > 0.0 { n as f64 / freedom } else { f64::NAN };
     let gross = outliers::gross(robust, problem.saturation.map_or(1.0, |(_, s)| s));
-    let totals = Totals::gathered(problem, at, moments, gross);
+    let mut totals = Totals::gathered(problem, at, moments, gross);
+    if problem.saturation.is_some() && is_lost(&totals) {
+        totals.normal = totals.bounded.clone();
+    }
     let sandwich = Sandwich::new(&totals.normal, &pinned, &limited(problem, at, &pinned));
     let shared: Vec<_> = totals.common.iter().cloned().chain([totals.outliers.shared(&sandwich.bread)]).collect();
-    let mut spread = &totals.known + &totals.by_residuals * inflation;
     let told_by_residuals = problem.saturation.is_some() || totals.stated.1 < n;
+    let mut spread = totals.known.clone();
+    if told_by_residuals {
+        spread += &totals.by_residuals * inflation;
+    }
     let leveraged =
         (n <= SMALL && freedom > 0.0 && told_by_residuals).then(|| Leveraged::new(problem, at, &sandwich.bread));
     if let Some(leveraged) = &leveraged {
@@ -92,8 +107,13 @@ pub(super) fn uncertainty(
         }
         None => (vec![student_quantile(0.975, freedom.max(1.0)); pinned.len()], Vec::new()),
     };
-    let offset = offset::offset(problem, at, gross);
+    // Model error, weighed otherwise, moves the parameters too, but is no offset.
+    let alike = totals.neighbours.correlation().is_some_and(|(rho, error)| rho > STRUCTURED && rho > 3.0 * error);
+    let offset = if alike { None } else { offset::offset(problem, at, gross) };
     let moved = offset.as_ref().map_or(DVector::zeros(pinned.len()), |offset| &sandwich.bread * &offset.pull);
+    let shift = errors.iter().zip(&moved).filter_map(|(e, m)| e.filter(|e| *e > 0.0).map(|e| m.abs() / e));
+    let shift = shift.fold(0.0, f64::max);
+    let offset = offset.filter(|offset| offset.is_clear && shift >= MATERIAL).map(|_| shift);
     let (clusters, count) = (totals.clusters.0, totals.clusters.1 as f64);
     let grouped = sandwich.covariance(&(clusters * (count / (count - 1.0).max(1.0))), &[]);
     let drawn = sandwich.covariance(&totals.drawn, &[]);
@@ -111,7 +131,7 @@ pub(super) fn uncertainty(
         bread: sandwich.bread,
         neighbours: totals.neighbours,
         stated: totals.stated,
-        offset: offset.and_then(|offset| offset.score),
+        offset,
         outliers,
         by_others,
         reach,
@@ -120,11 +140,22 @@ pub(super) fn uncertainty(
 }
 
 impl Uncertainty {
-    /// Half width of the 95 % interval of parameter `i`: the noise, and by how far weights that follow it move the estimate. `None` where the data
+    /// Half width of the 95 % interval of parameter `i`: the noise, and by how far it moves the estimate off the mean. `None` where the data
     /// don't determine it.
     pub fn half_width(&self, i: usize) -> Option<f64> {
-        self.errors[i].map(|error| self.reach[i] * error.hypot(self.moved[i]))
+        self.errors[i].map(|error| (self.reach[i] * error).hypot(NORMAL_95 * self.moved[i]))
     }
+}
+
+/// Whether growths of pulls that are 0 or less, of residuals beyond s, leave a direction of A open or nearly so that is not: as where the model can't
+/// follow the data that decide a parameter.
+fn is_lost(totals: &Totals) -> bool {
+    let scale = totals.bounded.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
+    let least = |m: &DMatrix<f64>| {
+        let scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| scale[i] * scale[j] * m[(i, j)]);
+        scaled.symmetric_eigenvalues().min()
+    };
+    least(&totals.normal) < LOST * least(&totals.bounded)
 }
 
 /// The weights of each channel that its energy limit ties together: they can move, but not their sum. A weight alone has nothing to be tied

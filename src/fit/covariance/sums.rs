@@ -13,12 +13,17 @@ use crate::fit::structure::Neighbours;
 use crate::fit::tally::Tallied;
 use crate::numeric::simd::dot_vectorised;
 
+/// Least growth of a robust pull over its weight, where a growth of less tells nothing.
+const LEAST_GROWTH: f64 = 0.05;
+
 /// The sums over all samples, by all parameters.
 pub(super) struct Totals {
     pub cost: f64,
     pub dark: Vec<bool>,
     /// A.
     pub normal: DMatrix<f64>,
+    /// A of a robust loss with every growth a little of its residual's weight at least; 0 without.
+    pub bounded: DMatrix<f64>,
     /// B of the values with a stated σ.
     pub known: DMatrix<f64>,
     /// B of the values without one, before the factor N/(N − p).
@@ -41,6 +46,7 @@ impl Totals {
             cost: 0.0,
             dark: vec![false; channels],
             normal: zero.clone(),
+            bounded: zero.clone(),
             known: zero.clone(),
             by_residuals: zero.clone(),
             drawn: zero.clone(),
@@ -83,6 +89,7 @@ impl Totals {
         let place = problem.place(at.weights.len(), channel);
         let squares = if has_sigma { &sums.squares } else { &sums.spread };
         spread_into(&mut self.normal, &sums.normal, &strength, &place);
+        spread_into(&mut self.bounded, &sums.bounded, &strength, &place);
         spread_into(&mut self.drawn, squares, &strength, &place);
         spread_into(&mut self.known, &sums.known, &strength, &place);
         spread_into(&mut self.by_residuals, &sums.spread, &strength, &place);
@@ -102,6 +109,7 @@ impl Totals {
 struct ChannelSums {
     cost: f64,
     normal: DMatrix<f64>,
+    bounded: DMatrix<f64>,
     /// B of the values without a stated σ, before the factor N/(N − p).
     spread: DMatrix<f64>,
     /// B of the values with one.
@@ -135,6 +143,7 @@ impl Piece {
         let sums = ChannelSums {
             cost: 0.0,
             normal: DMatrix::zeros(k, k),
+            bounded: DMatrix::zeros(k, k),
             spread: DMatrix::zeros(k, k),
             known: DMatrix::zeros(k, k),
             squares: DMatrix::zeros(k, k),
@@ -234,8 +243,13 @@ impl ChannelSums {
             scratch.curvature(block, channel);
             if let Some((kind, s)) = problem.saturation {
                 // How the pull itself grows with the residual.
-                let growth = |i: usize| w[i] * scratch.slope[i].powi(2) * kind.rho((scratch.r[i] / s).powi(2)).2;
-                scratch.weight = (0..w.len()).map(growth).collect();
+                let rho = |i: usize| kind.rho((scratch.r[i] / s).powi(2));
+                let scale = |i: usize| w[i] * scratch.slope[i].powi(2);
+                let bounded = |i: usize| scale(i) * rho(i).2.max(LEAST_GROWTH * rho(i).1);
+                let growth: Vec<f64> = (0..w.len()).map(|i| scale(i) * rho(i).2).collect();
+                scratch.weight = (0..w.len()).map(bounded).collect();
+                scratch.tally(k, &mut gradient, &mut self.bounded);
+                scratch.weight = growth;
             }
             scratch.tally(k, &mut gradient, &mut self.normal);
             gradient.fill(0.0);

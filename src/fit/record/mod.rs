@@ -3,6 +3,7 @@
 mod names;
 mod warnings;
 
+use super::covariance::STRUCTURED;
 use super::energy;
 use super::limits::{Ranges, TINY_SHAPE};
 use super::options::FitOptions;
@@ -14,7 +15,7 @@ use crate::brdf::{
 };
 use crate::measurement::Measurement;
 use names::{ended, lobe_name, weights, without_error};
-use warnings::{End, Ended, STRUCTURED};
+use warnings::{End, Ended};
 
 /// All that a record is made of: one part for all channels, or one a channel.
 pub(super) struct Facts<'a> {

@@ -2,13 +2,11 @@
 
 use super::Facts;
 use crate::brdf::{FitRecord, LobeRecord, Material, PerChannel};
+use crate::fit::covariance::STRUCTURED;
 use crate::fit::loss::Loss;
 use crate::fit::options::WeightMode;
 use crate::fit::outliers::Traits;
 use crate::fit::{energy, missing};
-
-/// Share of structure in the residuals' variance from which it is warned of.
-pub(super) const STRUCTURED: f64 = 0.25;
 
 /// An end of a range.
 #[derive(Debug, Clone, Copy)]
@@ -121,14 +119,7 @@ impl Facts<'_> {
         let linear = matches!(self.options.loss, Loss::L2 | Loss::CosineL2);
         let off = self.parts.iter().filter_map(|p| p.uncertainty.offset).fold(0.0, f64::max);
         if off > 0.0 && !structured {
-            let (cause, cover) = if linear {
-                (
-                    "weights that follow the noise pull",
-                    "the standard errors do not cover that, the intervals allow for it",
-                )
-            } else {
-                ("this loss pulls", "neither standard errors nor intervals cover that")
-            };
+            let cause = if linear { "weights that follow the noise pull" } else { "this loss pulls" };
             let follows = match self.options.robust {
                 Some(_) => "`--loss cosine-l2` without `--use-sigma` and `--robust`",
                 None => "`--loss cosine-l2` without `--use-sigma`",
@@ -136,8 +127,8 @@ impl Facts<'_> {
             let misfit = record.residual.as_ref().is_some_and(|r| r.model_rmse > 0.0);
             let or = if misfit { " (or the model's own error, weighed differently, does)" } else { "" };
             list.push(format!(
-                "the fit is off the mean of the data by {off:.0} times what chance allows: with noise as large as here {cause} it away{or}; \
-                 {cover}; {follows} follows the mean"
+                "with noise as large as here {cause} the fit off the mean of the data, by up to {off:.1} standard errors{or}; the intervals allow for \
+                 that, the standard errors do not; {follows} follows the mean"
             ));
         }
         if let Some(residual) = record

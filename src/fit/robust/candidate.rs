@@ -37,6 +37,7 @@ pub(super) struct Ranking {
 impl Ranking {
     /// Those whose residuals are all finite. `rounding` is the σ up to which they may be rounding.
     pub fn new(problem: &Problem<'_>, rounding: f64, list: Vec<Candidate>) -> Self {
+        let list: Vec<Candidate> = list.into_iter().filter(|c| c.sigma.is_finite()).collect();
         let any_met = list.iter().any(|c| c.met);
         let counting = list.iter().filter(|c| c.met || !any_met).map(|c| c.sigma);
         let least = counting.fold(f64::INFINITY, f64::min).max(rounding);
@@ -46,7 +47,7 @@ impl Ranking {
         let s = JUDGE_SCALE * margin * least;
         let costs = list.iter().map(|c| bounded_cost(problem.samples, &c.at, s)).collect::<Vec<f64>>();
         let judged = list.into_iter().zip(costs);
-        let list = judged.filter(|(c, cost)| c.sigma.is_finite() && cost.is_finite()).collect();
+        let list = judged.filter(|(_, cost)| cost.is_finite()).collect();
         Self { list, tolerance: ALIKE * residuals }
     }
 

@@ -117,6 +117,7 @@ struct Settling {
 impl Settling {
     fn new(problem: &Problem<'_>, like: &Solution, robust: Robust, options: &FitOptions) -> Self {
         let (typical, rounding) = sizes(problem.samples, like);
+        let rounding = rounding.max(typical * spread::rounding_share(problem));
         let common = spread::common_value(problem);
         Self { robust, steps: options.max_iterations, typical, rounding, common }
     }

@@ -29,11 +29,31 @@ pub(super) fn telling_spread(samples: &Samples<'_>, at: &Solution, common: Optio
 /// The value that a quarter of the data have or more, if any: what is clipped at 0, or rounded to one step. It agrees with a fit that has it,
 /// whatever that makes of the others.
 pub(super) fn common_value(problem: &Problem<'_>) -> Option<f64> {
+    let values = sorted_values(problem);
+    let longest = values.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
+    (4 * longest.len() >= values.len() && longest.len() < values.len()).then(|| longest[0])
+}
+
+/// σ of the rounding of values that are all multiples of one step, over their median size; 0 where they are not. Residuals of such values can't
+/// tell a smaller σ, even where a fit meets the most of them: they share few values.
+pub(super) fn rounding_share(problem: &Problem<'_>) -> f64 {
+    let mut values = sorted_values(problem);
+    let largest = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    values.dedup_by(|a, b| (*a - *b).abs() <= 1e-12 * largest);
+    let step = values.windows(2).map(|p| p[1] - p[0]).fold(f64::INFINITY, f64::min);
+    let is_multiple = |v: &f64| ((v / step) - (v / step).round()).abs() < 1e-3;
+    if values.len() < 3 || !values.iter().all(is_multiple) {
+        return 0.0;
+    }
+    step / 12f64.sqrt() / typical(problem)
+}
+
+/// Values of a part of the samples, ascending.
+fn sorted_values(problem: &Problem<'_>) -> Vec<f64> {
     let step = problem.samples.len().div_ceil(ENOUGH).max(1);
     let mut values = values(&problem.samples.listed(|i| i % step == 0));
     values.sort_by(f64::total_cmp);
-    let longest = values.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
-    (4 * longest.len() >= values.len() && longest.len() < values.len()).then(|| longest[0])
+    values
 }
 
 /// Samples that tell how often a value occurs.

@@ -45,7 +45,7 @@ impl Block {
     }
 
     /// The samples ordered by direction, so that neighbours stand together and the order of the file does not matter: along rings about the
-    /// normal, or along meridians where rings hold few.
+    /// normal, or in planes through it where that makes more neighbours.
     pub fn neighbours_together(&self, wi: &[DVec3], wo: &[DVec3]) -> Self {
         let by = |of: fn(DVec3) -> [i32; 2]| {
             let key = |k: u32| {
@@ -57,17 +57,25 @@ impl Block {
             order.par_sort_unstable();
             order
         };
-        let mut order = by(on_ring);
-        let rings = order.chunk_by(|(a, _), (b, _)| a[..3] == b[..3]).count();
-        if order.len() < FEW_ON_RING * rings {
-            order = by(on_meridian);
-        }
+        let near = |a: u32, b: u32| {
+            let (a, b) = (a as usize, b as usize);
+            wi[a].distance_squared(wi[b]) < SAME_INCIDENCE && wo[a].distance_squared(wo[b]) < FARTHEST
+        };
+        let sorted = |of| {
+            let order = by(of);
+            let index: Vec<u32> = order.iter().map(|(_, k)| self.index[*k as usize]).collect();
+            let pairs = neighbours(&index, |a, b| near(a as u32, b as u32));
+            let count = pairs.iter().filter(|p| **p > 0.0).count();
+            (order, index, pairs, count)
+        };
+        let rings = sorted(on_ring);
+        // Where most have a neighbour there are not more to be had.
+        let is_good = rings.3 * 10 >= self.len() * 9;
+        let meridians = if is_good { None } else { Some(sorted(on_meridian)) };
+        let (order, index, pairs, _) = meridians.filter(|m| m.3 > rings.3).unwrap_or(rings);
         let pick = |list: &Vec<f64>| order.iter().map(|(_, k)| list[*k as usize]).collect();
-        let index: Vec<u32> = order.iter().map(|(_, k)| self.index[*k as usize]).collect();
         Self {
-            pairs: neighbours(&index, |a, b| {
-                wi[a].distance_squared(wi[b]) < SAME_INCIDENCE && wo[a].distance_squared(wo[b]) < FARTHEST
-            }),
+            pairs,
             index,
             cos_i: pick(&self.cos_i),
             x: pick(&self.x),
@@ -110,8 +118,6 @@ pub(super) fn next_on_line(a: usize, b: usize) -> bool {
 
 /// Places on a line of unit length that are told apart: coarse enough to overlook rounding.
 const STEPS: f64 = 1e5;
-/// A scan whose rings hold fewer directions than this runs along meridians: a plane has two on each.
-const FEW_ON_RING: usize = 3;
 
 /// A direction's polar ring and its place on it.
 fn on_ring(w: DVec3) -> [i32; 2] {
@@ -187,6 +193,11 @@ mod tests {
             let wo: Vec<_> = (1..18).flat_map(|k| ring(5.0 * f64::from(k), &[plane, plane + 180.0])).collect();
             assert_eq!(pairs(&wo), 33.0, "azimuth {plane}");
         }
+        // Encoders' azimuths of one half plane; four half planes.
+        let one_sided: Vec<_> = (1..43).flat_map(|k| ring(2.0 * f64::from(k), &[0.01 * f64::from(k % 5)])).collect();
+        assert_eq!(pairs(&one_sided), 41.0);
+        let crossed: Vec<_> = (1..18).flat_map(|k| ring(5.0 * f64::from(k), &[0.0, 90.0, 180.0, 270.0])).collect();
+        assert!(pairs(&crossed) >= 66.0);
         let azimuths: Vec<f64> = (0..36).map(|k| 10.0 * f64::from(k)).collect();
         let grid: Vec<_> = (1..9).flat_map(|k| ring(10.0 * f64::from(k), &azimuths)).collect();
         assert!(pairs(&grid) >= 8.0 * 35.0);
