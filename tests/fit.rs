@@ -82,7 +82,7 @@ fn held_of_200(stated_sigma: bool) -> [i32; 3] {
     let truth = material(&[0.3], &[0.2], 40.0);
     let mut held = [0; 3];
     for seed in 0..200 {
-        let instrument = Instrument { electrons: 1e4, read_noise: 10.0, readings: 1 };
+        let instrument = Instrument { electrons: 1e4, ..Instrument::default() };
         let mut m = measure(&truth, &instrument, &Scan::Hemisphere { step_deg: 10.0 }, seed);
         m.sigma = m.sigma.filter(|_| stated_sigma);
         let record = fit(&m, &options("lambert+phong")).expect("a fit").material.fit.expect("a record");

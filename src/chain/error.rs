@@ -40,6 +40,14 @@ pub enum ChainError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// Raw readings can't be reduced.
+    #[error("{name}: {source}")]
+    Reduce {
+        /// The file.
+        name: String,
+        /// Why.
+        source: crate::gonio::ReduceError,
+    },
     /// An output could not be written.
     #[error("{path}: {source}", path = path.display())]
     Write {

@@ -4,11 +4,12 @@ use super::error::ChainError;
 use super::source::Source;
 use crate::brdf::{Brdf, Material};
 use crate::control::Control;
-use crate::gonio::{Instrument, Scan, simulate};
+use crate::fit::{FitOptions, fit};
+use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, reduce, simulate};
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
 
-/// Measures a material or table along a scan.
+/// Measures a material or table along a scan: readings, reduced.
 ///
 /// # Errors
 /// [`ChainError`] where material and scan belong to different worlds, the table can't be interpolated, or the scan is too large.
@@ -20,6 +21,72 @@ pub fn measure(
     seed: u64,
     control: Control<'_>,
 ) -> Result<Measurement, ChainError> {
+    if !instrument.is_plain() {
+        let raw = measure_raw(name, source, instrument, scan, seed, control)?;
+        let mut measurement = reduced(name, &raw, instrument)?.measurement;
+        measurement.origin = format!("simulated, scan {scan}, seed {seed}");
+        return Ok(measurement);
+    }
+    with_truth(name, source, scan, |truth, channels| simulate(name, truth, channels, instrument, scan, seed, control))
+}
+
+/// Raw readings of a material or table along a scan.
+///
+/// # Errors
+/// As [`measure`], and for a scan of the flat world.
+pub fn measure_raw(
+    name: &str,
+    source: &Source,
+    instrument: &Instrument,
+    scan: &Scan,
+    seed: u64,
+    control: Control<'_>,
+) -> Result<Raw, ChainError> {
+    if scan.dimension() == Dimension::Flat {
+        let reason = "raw readings and instruments with parts belong to space: choose in-plane, hemisphere or merl";
+        return Err(ChainError::Mismatch(format!("{name}: {reason}")));
+    }
+    with_truth(name, source, scan, |truth, channels| {
+        let (directions, weights) = scan.directions()?;
+        let (directions, weights) = (&directions, &weights);
+        let job = Job { truth, channels, instrument, directions, weights, seed, accuracy: ACCURACY, left_out: &[] };
+        Some(job.run(control))
+    })
+}
+
+/// Reduces raw readings. Where errors of positions matter, a fit of `lambert+phong+phong` to a first reduction tells what they do.
+///
+/// # Errors
+/// [`ChainError::Reduce`].
+pub fn reduced(name: &str, raw: &Raw, instrument: &Instrument) -> Result<Reduction, ChainError> {
+    let wrong = |source| ChainError::Reduce { name: name.to_owned(), source };
+    let first = reduce(name, raw, instrument, None).map_err(wrong)?;
+    if !instrument.has_positions() {
+        return Ok(first);
+    }
+    let model = SURROGATE.parse().ok().map(FitOptions::new);
+    match model.map(|options| fit(&first.measurement, &options)) {
+        Some(Ok(fitted)) => {
+            let model = |wi, wo, out: &mut [f64]| {
+                fitted.material.write_value(wi, wo, out);
+                true
+            };
+            reduce(name, raw, instrument, Some(&model)).map_err(wrong)
+        }
+        _ => Ok(first), // which says that there was no model
+    }
+}
+
+/// The model whose slopes tell what errors of positions do.
+const SURROGATE: &str = "lambert+phong+phong";
+
+/// What `work` makes of the material's values and channels; `None` from it is a scan that is too large.
+fn with_truth<T>(
+    name: &str,
+    source: &Source,
+    scan: &Scan,
+    work: impl FnOnce(&Truth<'_>, &[String]) -> Option<T>,
+) -> Result<T, ChainError> {
     let too_large = || ChainError::ScanTooLarge { scan: scan.to_string() };
     match source {
         Source::Fitted(material) => {
@@ -28,14 +95,14 @@ pub fn measure(
                 material.write_value(wi, wo, out);
                 true
             };
-            simulate(name, &truth, &material.channels, instrument, scan, seed, control).ok_or_else(too_large)
+            work(&truth, &material.channels).ok_or_else(too_large)
         }
         Source::Measured(table) => {
             same_world(name, table.dimension == Dimension::Flat, scan.dimension())?;
             let all: Vec<usize> = (0..table.channels.len()).collect();
             let brdf = TableBrdf::new(table, &all)?;
             let truth = |wi, wo, out: &mut [f64]| brdf.eval(wi, wo, out);
-            simulate(name, &truth, &table.channels, instrument, scan, seed, control).ok_or_else(too_large)
+            work(&truth, &table.channels).ok_or_else(too_large)
         }
     }
 }

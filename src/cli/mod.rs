@@ -12,6 +12,7 @@ mod fit;
 mod info;
 mod models;
 mod output;
+mod reduce;
 mod render;
 mod scenes;
 mod simulate;
@@ -59,6 +60,8 @@ enum Command {
     Demo(demo::Args),
     /// Measure a material by the simulated gonioreflectometer
     Simulate(simulate::Args),
+    /// Reduce raw readings to a measurement: BRDF ± σ, with what readings share
+    Reduce(reduce::Args),
     /// Say what is in a measurement
     Info(info::Args),
     /// Fit an analytic model to each measurement
@@ -110,6 +113,7 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::run(&args, ui),
         Command::Simulate(args) => simulate::run(&args, ui),
+        Command::Reduce(args) => reduce::run(&args, ui),
         Command::Info(args) => info::run(&args, ui),
         Command::Fit(args) => fit::run(&args, ui),
         Command::Render(args) => render::run(&args, ui),

@@ -5,15 +5,18 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{check_folder, keeps_inputs, output_format, read_text, stdout_is_free, write_measurement};
+use super::output::{
+    check_folder, keeps_inputs, output_format, read_text, stdout_is_free, write_measurement, write_text,
+};
 use super::ui::Ui;
 use crate::chain;
-use crate::gonio::{Instrument, Scan, SimulationSpec};
+use crate::gonio::{self, Instrument, Scan, SimulationSpec};
 use crate::measurement::{ReadOptions, formats};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit simulate --material glossy-paint --scan hemisphere:5 --seed 1 --out paint.csv
+  goniofit simulate --material satin --instrument lab.toml --scan in-plane:5 --raw raw.csv --out satin.csv
   goniofit simulate --material gold.json --scan merl --noiseless --out gold.binary")]
 pub(super) struct Args {
     /// A simulation file (`-` is stdin); options given beside it replace what it says
@@ -28,6 +31,12 @@ pub(super) struct Args {
     /// Seed of the noise [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// The instrument: a simulation file whose [instrument] counts (see docs/instrument.md)
+    #[arg(long, value_name = "I")]
+    instrument: Option<PathBuf>,
+    /// Write the raw readings too, as CSV
+    #[arg(long, value_name = "RAW.csv")]
+    raw: Option<PathBuf>,
     /// Photoelectrons in a reading of 1/sr at cosθo = 1 [default: 100000]; 0 is a detector without any noise
     #[arg(long, value_name = "E", allow_negative_numbers = true)]
     electrons: Option<f64>,
@@ -48,25 +57,40 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let format = output_format(&args.out, None)?;
     check_folder(&args.out)?;
+    if let Some(raw) = &args.raw {
+        check_folder(raw)?;
+        let inputs = [args.spec.as_deref(), args.instrument.as_deref(), Some(&args.out)];
+        keeps_inputs("--raw", raw, inputs.into_iter().flatten())?;
+    }
     stdout_is_free(&args.out, ui)?;
     let plan = Plan::new(args)?;
     let source = chain::load(&plan.material, &ReadOptions::default())?;
     let name = Path::new(&plan.material).file_stem().map_or("simulated".into(), |s| s.to_string_lossy());
-    let table = chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
+    let table = match &args.raw {
+        None => chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?,
+        Some(path) => {
+            let raw = chain::measure_raw(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
+            write_text(path, &raw.to_csv(&plan.instrument))?;
+            chain::reduced(&name, &raw, &plan.instrument)?.measurement
+        }
+    };
     for note in &table.notes {
         ui.warn(note);
     }
     write_measurement(&table, &args.out, format, ui)?;
     let valid = table.values.len() as u64 - table.masked.total();
     if args.out.as_os_str() != "-" {
+        let effects = gonio::plan(&plan.instrument);
+        let on: Vec<&str> = effects.effects.iter().filter(|e| e.on).map(|e| e.name).collect();
         let text = format!(
-            "{}: {} direction pairs, {valid} valid values, scan {}, seed {}",
+            "{}: {} direction pairs, {valid} valid values, scan {}, seed {}; effects: {}",
             args.out.display(),
             table.len(),
             plan.scan,
-            plan.seed
+            plan.seed,
+            if on.is_empty() { "none".into() } else { on.join(", ") }
         );
-        let object = json!({ "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed });
+        let object = json!({ "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed, "effects": effects.effects });
         ui.result(&text, &object);
     }
     Ok(())
@@ -104,9 +128,11 @@ impl Plan {
         let list = scan.as_ref().and_then(|s| s.strip_prefix("list:"));
         keeps_inputs("--out", &args.out, [Some(&material[..]), list].into_iter().flatten().map(Path::new))?;
         let scan = scan.map_or(Ok(Scan::Hemisphere { step_deg: 5.0 }), |text| parse_scan(&text))?;
-        let mut instrument = of_spec.map_or_else(Instrument::default, |s| s.instrument);
+        let of_file = args.instrument.as_deref().map(read_spec).transpose()?.map(|s| s.instrument);
+        let of_spec_file = || of_spec.map_or_else(Instrument::default, |s| s.instrument.clone());
+        let mut instrument = of_file.unwrap_or_else(of_spec_file);
         if args.noiseless {
-            instrument = Instrument::noiseless();
+            (instrument.electrons, instrument.read_noise) = (0.0, 0.0);
         }
         instrument.electrons = args.electrons.unwrap_or(instrument.electrons);
         instrument.read_noise = args.read_noise.unwrap_or(instrument.read_noise);
@@ -119,7 +145,7 @@ impl Plan {
     }
 }
 
-fn read_spec(path: &Path) -> Result<SimulationSpec, Failure> {
+pub(super) fn read_spec(path: &Path) -> Result<SimulationSpec, Failure> {
     let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("{}: {e}", path.display()));
     SimulationSpec::from_toml(&read_text(path)?).map_err(|e| wrong(&e))
 }

@@ -4,8 +4,10 @@
 //! [`Control::silent`]; the command line passes a progress bar and a flag that Ctrl-C sets.
 
 mod files;
+mod plan;
 
 pub use files::write_whole;
+pub use plan::{Effect, Plan};
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -34,6 +34,16 @@ pub fn sin_cos_deg(angle_deg: f64) -> (f64, f64) {
     }
 }
 
+/// `w` with its polar angle larger by `theta` and its azimuth by `phi` (rad); the axis counts as azimuth 0.
+#[must_use]
+pub fn turned(w: DVec3, theta: f64, phi: f64) -> DVec3 {
+    let (sin_t, (sin_p, cos_p)) = (w.x.hypot(w.y), phi.sin_cos());
+    let (x, y) = if sin_t > 0.0 { (w.x / sin_t, w.y / sin_t) } else { (1.0, 0.0) };
+    let (s, c) = theta.sin_cos();
+    let (sin, cos) = (sin_t * c + w.z * s, w.z * c - sin_t * s);
+    DVec3::new(sin * (x * cos_p - y * sin_p), sin * (x * sin_p + y * cos_p), cos)
+}
+
 /// Polar angle of `w` from +z, in [0, π] rad; accurate near 0 and π, where acos is not.
 #[must_use]
 pub fn theta_of(w: DVec3) -> f64 {
@@ -67,6 +77,16 @@ pub fn cap_solid_angle(theta: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_direction_is_turned_by_its_angles() {
+        for (theta, phi, more, round) in
+            [(0.3, 0.0, 0.1, 0.0), (1.2, 2.0, -0.3, 0.5), (1.5, -3.0, 0.2, -0.1), (0.0, 0.0, 0.2, 1.0)]
+        {
+            let w = turned(direction(theta, phi), more, round);
+            assert!((w - direction(theta + more, phi + round)).length() < 1e-15, "{theta} {phi}");
+        }
+    }
 
     #[test]
     fn angles_come_back_from_directions_at_every_scale() {

@@ -2,28 +2,56 @@
 
 use rand_distr::{Distribution, Normal, Poisson};
 
+use super::parts::{Axes, Detector, Holder, Protocol, Reference, Source, Surroundings};
+use super::reduce::positions;
 use crate::numeric::random::{Purpose, stream};
 
-/// An ideal gonioreflectometer with a noisy detector.
+/// A gonioreflectometer. As it stands by default it is ideal but for a noisy detector; parts that are described bring their effects
+/// (`docs/instrument.md`).
 ///
 /// The source lights a spot on the sample, the detector sees all of it: the flux it receives is ∝ f·cosθo, and so is the mean
-/// number of photoelectrons, N = f·cosθo·`electrons`. Photoelectrons are Poisson-distributed (shot noise); the electronics add
+/// number of photoelectrons, N = f·cosθo·`electrons`, in a second. Photoelectrons are Poisson-distributed (shot noise); the electronics add
 /// normal noise of `read_noise` electrons to each reading. The BRDF comes back as signal/(cosθo·`electrons`).
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Instrument {
-    /// Photoelectrons in one reading of a BRDF of 1/sr at cosθo = 1; 0 means a detector without noise.
+    /// Photoelectrons a second (in one reading, if no exposures are given) of a BRDF of 1/sr at cosθo = 1; 0 means a detector without noise.
     pub electrons: f64,
     /// Standard deviation of the electronics' noise in one reading, electrons.
     pub read_noise: f64,
     /// Readings averaged at each pair of directions.
     pub readings: u32,
+    /// The source and its beam.
+    pub source: Source,
+    /// The sample on its holder.
+    pub sample: Holder,
+    /// The detector.
+    pub detector: Detector,
+    /// The reference standard.
+    pub reference: Reference,
+    /// The axes.
+    pub axes: Axes,
+    /// Stray light and shadow.
+    pub surroundings: Surroundings,
+    /// The order of readings.
+    pub protocol: Protocol,
 }
 
 impl Default for Instrument {
     /// A cooled detector at a bright source: 10⁵ electrons per 1/sr, 10 electrons of read noise, one reading.
     fn default() -> Self {
-        Self { electrons: 1e5, read_noise: 10.0, readings: 1 }
+        Self {
+            electrons: 1e5,
+            read_noise: 10.0,
+            readings: 1,
+            source: Source::default(),
+            sample: Holder::default(),
+            detector: Detector::default(),
+            reference: Reference::default(),
+            axes: Axes::default(),
+            surroundings: Surroundings::default(),
+            protocol: Protocol::default(),
+        }
     }
 }
 
@@ -31,7 +59,7 @@ impl Instrument {
     /// Without any noise: readings are the truth.
     #[must_use]
     pub fn noiseless() -> Self {
-        Self { electrons: 0.0, read_noise: 0.0, readings: 1 }
+        Self { electrons: 0.0, read_noise: 0.0, ..Self::default() }
     }
 
     /// Whether the detector adds noise.
@@ -50,7 +78,56 @@ impl Instrument {
         if !(self.read_noise >= 0.0 && self.read_noise <= 1e15) {
             return said("instrument.read_noise", "a number from 0 to 1e15", self.read_noise);
         }
-        (self.readings == 0).then(|| "instrument.readings: expected at least 1, found 0".to_owned())
+        let none = || (self.readings == 0).then(|| "instrument.readings: expected at least 1, found 0".to_owned());
+        let detector = &self.detector;
+        let counts = detector.dark_per_s + detector.dark_drift_per_sqrt_hour + detector.full_well > 0.0;
+        let unit = (!self.is_noisy() && counts).then(|| {
+            "instrument.electrons: what counts electrons (dark, full_well) needs a number above 0, found 0".into()
+        });
+        let parts = [
+            unit,
+            self.source.fault(),
+            self.sample.fault(),
+            self.detector.fault(),
+            self.reference.fault(),
+            self.axes.fault(),
+            self.surroundings.fault(),
+            self.protocol.fault(),
+        ];
+        none().or_else(|| parts.into_iter().flatten().next())
+    }
+
+    /// Whether nothing but the detector's noise is described, so that no raw readings are needed to know what comes back.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        let Self { electrons, read_noise, readings, .. } = *self;
+        *self == Self { electrons, read_noise, readings, axes: self.axes, protocol: self.protocol, ..Self::default() }
+            && self.axes.zero_u_deg == 0.0
+            && self.axes.jitter_deg == 0.0
+    }
+
+    /// Whether readings are compared with a reference standard.
+    #[must_use]
+    pub fn has_reference(&self) -> bool {
+        self.reference.reflectance > 0.0
+    }
+
+    /// Whether positions of axes or sample are uncertain.
+    #[must_use]
+    pub fn has_positions(&self) -> bool {
+        positions::matter(self)
+    }
+
+    /// Whether the closed shutter must be read.
+    #[must_use]
+    pub fn has_dark(&self) -> bool {
+        self.detector.dark_per_s > 0.0 || self.detector.dark_drift_per_sqrt_hour > 0.0
+    }
+
+    /// Electrons a second of a BRDF of 1/sr at cosθo = 1: 1 where the detector is without noise and its signal in no unit.
+    #[must_use]
+    pub fn gain(&self) -> f64 {
+        if self.is_noisy() { self.electrons } else { 1.0 }
     }
 
     /// One reduced reading (f, σ) of the true value `f` (1/sr) at cosθo = `cos_o` > 0. σ is what an experimenter would state: shot
@@ -69,7 +146,7 @@ impl Instrument {
     }
 }
 
-fn shot(mean: f64, seed: u64, index: u64) -> f64 {
+pub(super) fn shot(mean: f64, seed: u64, index: u64) -> f64 {
     let mut rng = stream(seed, Purpose::ShotNoise, index);
     if mean <= 0.0 {
         return 0.0; // a table's noise as the truth: no photons
@@ -81,7 +158,7 @@ fn shot(mean: f64, seed: u64, index: u64) -> f64 {
     }
 }
 
-fn normal(seed: u64, index: u64) -> f64 {
+pub(super) fn normal(seed: u64, index: u64) -> f64 {
     Normal::new(0.0, 1.0).map_or(f64::NAN, |n| n.sample(&mut stream(seed, Purpose::ReadNoise, index)))
 }
 
@@ -94,7 +171,7 @@ mod tests {
         for (f, electrons, readings) in
             [(0.2, 1e5, 1), (5.0, 1e4, 4), (1e-3, 1e4, 1), (0.0, 1e4, 2), (2400.0, 1e15, 100)]
         {
-            let instrument = Instrument { electrons, read_noise: 20.0, readings };
+            let instrument = Instrument { electrons, read_noise: 20.0, readings, ..Instrument::default() };
             let (cos_o, draws) = (0.5, 20_000u64);
             let gain = electrons * cos_o * f64::from(readings);
             let truth = (f * gain + 400.0 * f64::from(readings)).sqrt() / gain;

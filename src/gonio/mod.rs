@@ -1,14 +1,31 @@
 //! The simulated gonioreflectometer.
 //!
-//! In: a true BRDF, an [`Instrument`], a [`Scan`], a seed. Out: a [`crate::measurement::Measurement`] in 1/sr with its σ. The one decision to
-//! know: a reading's noise is keyed by (seed, channel, position in the scan), so it depends on neither threads nor order.
+//! In: a true BRDF, an [`Instrument`], a [`Scan`], a seed. Out: a [`crate::measurement::Measurement`] in 1/sr with its σ, by way of [`Raw`]
+//! readings where the instrument has more to it than a noisy detector ([`Job`], [`reduce`]). The one decision to know: a reading's noise is keyed by
+//! (seed, channel, position in the scan), so it depends on neither threads nor order; an instrument's own errors are keyed by the seed.
 
+mod actual;
+mod effects;
+mod forward;
 mod instrument;
+pub mod parts;
+mod raw;
+mod raw_file;
+mod reading;
+mod reduce;
 mod scan;
+mod series;
 mod simulate;
 mod spec;
 
+pub use actual::Actual;
+pub use effects::plan;
+pub use forward::{ACCURACY, Job};
 pub use instrument::Instrument;
+pub use raw::Raw;
+pub use reading::{Kind, Reading};
+pub use reduce::{Budget, Line, ReduceError, Reduction, Type, reduce};
 pub use scan::{Scan, ScanError};
+pub use series::series;
 pub use simulate::{Truth, simulate};
 pub use spec::{SimulationSpec, SpecError};

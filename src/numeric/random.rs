@@ -18,6 +18,10 @@ pub enum Purpose {
     Study = 4,
     /// Data sets redrawn by a bootstrap.
     Bootstrap = 5,
+    /// Errors that one simulated instrument has in all its readings.
+    Instrument = 6,
+    /// Where an axis stops.
+    Jitter = 7,
 }
 
 /// The stream of (seed, purpose, index).

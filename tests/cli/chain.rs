@@ -188,3 +188,69 @@ fn a_scan_from_a_list_measures_the_directions_of_that_file() {
     };
     assert_eq!(angles("s.csv"), angles("p.csv"));
 }
+
+const LAB: &str = "version = 1
+[instrument]
+electrons = 1e6
+[instrument.detector]
+aperture_deg = 1.0
+dark_per_s = 200
+full_well = 4e5
+bits = 16
+exposures_s = [0.02, 0.5]
+[instrument.reference]
+reflectance = 0.985
+reflectance_u = 0.003
+[instrument.axes]
+zero_u_deg = 0.02
+[instrument.surroundings]
+stray_per_sr = 2e-3
+shadow_deg = 3
+";
+
+/// An instrument with faults: its raw readings, written and reduced again, give the measurement that came with them, and a fit of it finds the
+/// material within the errors that it states, the certificate's among them.
+#[test]
+fn raw_readings_reduce_to_the_measurement_and_fit_within_its_errors() {
+    let b = Bench::new();
+    b.write("lab.toml", LAB);
+    let simulate =
+        ["simulate", "--material", "satin", "--instrument", "lab.toml", "--scan", "in-plane:5", "--seed", "2"];
+    b.ok(&[&simulate[..], &["--raw", "raw.csv", "--out", "first.csv"]].concat());
+    let told = b.json(&["reduce", "raw.csv", "--out", "again.csv", "--budget", "budget.csv"]);
+    let (first, again) = (b.text("first.csv"), b.text("again.csv"));
+    let rows = |text: &str| text.lines().filter(|l| !l.starts_with('#')).count();
+    assert_eq!(rows(&first), rows(&again));
+    assert!(first.contains("common_1_r") && again.contains("common_1_r"));
+    let lines = told["budget"].as_array().expect("a budget");
+    let of = |name: &str| lines.iter().find(|l| l["name"] == name).unwrap_or_else(|| panic!("{name} in {lines:?}"));
+    assert!((number(&of("certificate of the reference")["relative"]) - 0.003).abs() < 1e-12);
+    assert!(number(&of("all together")["relative"]) > 0.003);
+    assert!(b.text("budget.csv").lines().count() > 500);
+    b.ok(&["fit", "again.csv", "--out", "fit.json"]);
+    let file = b.json_file("fit.json");
+    let range = &file["fit"]["interval_95"][0]["weight"][2];
+    assert!(number(&range[0]) < 0.30 && number(&range[1]) > 0.30, "{range}");
+    // The certificate's 0.3 % is in the error of a weight of 0.3.
+    assert!(number(&file["fit"]["standard_error"][0]["weight"][2]) > 0.8e-3, "{}", file["fit"]["standard_error"]);
+}
+
+#[test]
+fn what_is_wrong_with_an_instrument_or_its_readings_is_named() {
+    let b = Bench::new();
+    b.write("bad.toml", "version = 1\n[instrument.detector]\nbits = 12\n");
+    b.write("key.toml", "version = 1\n[instrument.detector]\nbit = 12\n");
+    b.write("cut.csv", "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,kind,time_s,exposure_s,repeat,signal_y\n");
+    let simulate = |file: &'static str| ["simulate", "--material", "satin", "--instrument", file, "--out", "x.csv"];
+    for (args, says) in [
+        (&simulate("bad.toml")[..], "full_well"),
+        (&simulate("key.toml")[..], "bit"),
+        (&simulate("none.toml")[..], "none.toml"),
+        (&["reduce", "cut.csv", "--out", "x.csv"][..], "row of data"),
+        (&["reduce", "cut.csv", "--out", "cut.csv"][..], "cut.csv"),
+    ] {
+        let ran = b.run(args);
+        assert!(ran.code == Some(2) && ran.err.contains(says), "{args:?}: {ran:?}");
+        assert!(!b.path("x.csv").exists());
+    }
+}

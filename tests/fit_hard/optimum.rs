@@ -10,13 +10,13 @@ use crate::support::*;
 /// A noisy table that Lambert and one Phong lobe do not describe: its residuals are far from 0 and structured.
 fn misfit(seed: u64) -> Measurement {
     let truth = lobes(0.25, &[(0.1, 9.0), (0.15, 120.0)]);
-    let instrument = Instrument { electrons: 3e4, read_noise: 10.0, readings: 1 };
+    let instrument = Instrument { electrons: 3e4, ..Instrument::default() };
     measure(&truth, &instrument, &HEMISPHERE(10.0), seed)
 }
 
 fn two_channels(scan: &Scan, electrons: f64) -> Measurement {
     let truth = material(&[0.3, 0.15], &[0.1, 0.25], 35.0);
-    measure(&truth, &Instrument { electrons, read_noise: 10.0, readings: 1 }, scan, 5)
+    measure(&truth, &Instrument { electrons, ..Instrument::default() }, scan, 5)
 }
 
 /// All losses, weights and robust losses on a table.

@@ -18,6 +18,7 @@ mod write;
 
 pub(super) use read::{read, read_directions};
 pub(super) use write::write;
+pub(crate) use write::{push_number, spherical_deg};
 
 use crate::measurement::MerlAngles;
 
@@ -40,7 +41,7 @@ const GRIDS: [(&str, MerlAngles); 2] = [("merl-center", MerlAngles::Center), ("m
 const SOLID_ANGLE: &str = "solid-angle";
 
 /// Whether a column of this name is anything but a channel: such a name can't be given to a channel.
-fn is_reserved(name: &str) -> bool {
+pub(crate) fn is_reserved(name: &str) -> bool {
     const RAW: [&str; 4] = ["kind", "time_s", "exposure_s", "repeat"];
     const PREFIXES: [&str; 5] = ["theta_", "phi_", "sigma_", "common_", "signal_"];
     name.is_empty() || name == "weight" || RAW.contains(&name) || PREFIXES.iter().any(|p| name.starts_with(p))

@@ -113,7 +113,7 @@ fn write_row(measurement: &Measurement, i: usize, text: &mut String) {
 
 /// Appends `value` and a comma; an empty cell for NaN. The fewest digits that give `value` back, with an exponent where the
 /// plain form is long.
-fn push_number(text: &mut String, value: f64) {
+pub(crate) fn push_number(text: &mut String, value: f64) {
     let plain = value == 0.0 || (1e-5..1e15).contains(&value.abs());
     // Writing to a String can't fail.
     let _ = match value {
@@ -125,7 +125,7 @@ fn push_number(text: &mut String, value: f64) {
 }
 
 /// θ and φ (deg) that [`direction_deg`] turns into `w` again, to within 10⁻¹⁵; round numbers where they do.
-fn spherical_deg(w: DVec3) -> [f64; 2] {
+pub(crate) fn spherical_deg(w: DVec3) -> [f64; 2] {
     let theta = refine(theta_of(w).to_degrees(), w.truncate().length(), w.z);
     let radius = w.x.hypot(w.y);
     // Adding 0 turns −0 into 0, so that 180° is not written as −180°.

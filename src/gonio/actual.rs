@@ -1,0 +1,84 @@
+//! What one simulated instrument is really like: a draw of everything that its description leaves uncertain.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::instrument::Instrument;
+use super::reading::Reading;
+use crate::numeric::random::{Purpose, Stream, stream};
+
+/// Errors of one instrument, the same in all its readings, and the walks of what drifts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Actual {
+    /// Errors of the zeros of θi, φi, θo, φo, rad.
+    pub zeros: [f64; 4],
+    /// Tilt of the normal towards +x and +y, rad.
+    pub tilt: [f64; 2],
+    /// Height of the surface over the axes' crossing, m.
+    pub height_m: f64,
+    /// Relative error of the reference's certificate: its true reflectance over the stated one, less 1.
+    pub certificate: f64,
+    /// Relative nonlinearity at full well.
+    pub nonlinearity: f64,
+    /// Source power over its first, less 1, at each reading; empty where it does not drift.
+    pub power: Vec<f64>,
+    /// Dark current less its mean, electrons a second, at each reading; empty where it does not drift.
+    pub dark: Vec<f64>,
+}
+
+/// Indices of the draws of [`Purpose::Instrument`].
+const FIXED: u64 = 0;
+const POWER: u64 = 1;
+const DARK: u64 = 2;
+
+impl Actual {
+    /// Draws one.
+    #[must_use]
+    pub fn draw(instrument: &Instrument, readings: &[Reading], seed: u64) -> Self {
+        let rng = &mut stream(seed, Purpose::Instrument, FIXED);
+        let zero = instrument.axes.zero_u_deg.to_radians();
+        let tilt = instrument.sample.tilt_u_deg.to_radians();
+        // All are drawn, whatever is on: switching one leaves the others' bits.
+        let mut draw = |u: f64| u * normal(rng);
+        Self {
+            zeros: [zero; 4].map(&mut draw),
+            tilt: [tilt; 2].map(&mut draw),
+            height_m: draw(instrument.sample.height_u_m),
+            certificate: draw(instrument.reference.reflectance_u),
+            nonlinearity: draw(instrument.detector.nonlinearity_u),
+            power: walk(instrument.source.drift_per_sqrt_hour, readings, stream(seed, Purpose::Instrument, POWER)),
+            dark: walk(instrument.detector.dark_drift_per_sqrt_hour, readings, stream(seed, Purpose::Instrument, DARK)),
+        }
+    }
+
+    /// The instrument as described, without any error.
+    #[must_use]
+    pub fn nominal() -> Self {
+        Self {
+            zeros: [0.0; 4],
+            tilt: [0.0; 2],
+            height_m: 0.0,
+            certificate: 0.0,
+            nonlinearity: 0.0,
+            power: Vec::new(),
+            dark: Vec::new(),
+        }
+    }
+}
+
+/// A random walk from 0 at the times of the readings.
+fn walk(per_sqrt_hour: f64, readings: &[Reading], mut rng: Stream) -> Vec<f64> {
+    if per_sqrt_hour == 0.0 {
+        return Vec::new();
+    }
+    let (mut place, mut before) = (0.0, 0.0);
+    let mut step = |reading: &Reading| {
+        place += per_sqrt_hour * ((reading.time_s - before) / 3600.0).max(0.0).sqrt() * normal(&mut rng);
+        before = reading.time_s;
+        place
+    };
+    readings.iter().map(&mut step).collect()
+}
+
+fn normal(rng: &mut Stream) -> f64 {
+    StandardNormal.sample(rng)
+}

@@ -1,0 +1,67 @@
+//! Height: the surface stands h above the axes' crossing, so source and detector see the spot from nearer and from another side.
+//!
+//! A detector at r in the direction w sees the spot at h·z along w·r − h·z. With a source at a finite distance the same holds of it, and irradiance
+//! goes as 1/r². Where the beam falls on the sample beside the detector's axis is not followed.
+
+use glam::DVec3;
+
+use super::{Block, Entry, Maker, Pass, stated};
+
+pub(super) const EFFECT: Entry = Entry {
+    name: "sample height",
+    calls: |i| {
+        let seen = i.detector.distance_m > 0.0 || i.source.distance_m > 0.0;
+        stated(i.sample.height_u_m, "sample.height_u_m", " m")
+            .and_then(|why| if seen { Ok(why) } else { Err("source and detector are far away".into()) })
+    },
+    make: |maker: &Maker<'_>| {
+        let (source, detector) = (maker.instrument.source.distance_m, maker.instrument.detector.distance_m);
+        Some(Box::new(Height { above: maker.actual.height_m, source, detector }))
+    },
+};
+
+struct Height {
+    above: f64,
+    source: f64,
+    detector: f64,
+}
+
+impl Pass for Height {
+    fn apply(&self, block: &mut Block<'_>) {
+        for i in 0..block.readings.len() {
+            let (wi, near_i) = seen(block.wi[i], self.above, self.source);
+            let (wo, near_o) = seen(block.wo[i], self.above, self.detector);
+            (block.wi[i], block.wo[i]) = (wi, wo);
+            // The signal is 1 yet: what the light's pass multiplies.
+            block.scale(i, near_i * near_o);
+        }
+    }
+}
+
+/// The direction and the factor 1/r² of what stands `distance` away along `w`, seen from `height` above the crossing; 0 is far away.
+pub(in crate::gonio) fn seen(w: DVec3, height: f64, distance: f64) -> (DVec3, f64) {
+    if distance == 0.0 {
+        return (w, 1.0);
+    }
+    let from_spot = w - DVec3::Z * (height / distance);
+    (from_spot.normalize(), 1.0 / from_spot.length_squared())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Along the normal: nearer by h, no other direction. To first order 1 + 2 h cosθ/r and an angle of h sinθ/r away from the normal.
+    #[test]
+    fn a_higher_surface_is_nearer_and_seen_from_lower_down() {
+        assert_eq!(seen(DVec3::Z, 0.1, 1.0), (DVec3::Z, 1.0 / 0.9f64.powi(2)));
+        assert_eq!(seen(DVec3::Z, 0.1, 0.0), (DVec3::Z, 1.0));
+        let w = DVec3::new(0.6, 0.0, 0.8);
+        for height in [1e-3, 1e-4, 1e-5] {
+            let (from, near) = seen(w, height, 2.0);
+            let angle = from.x.atan2(from.z) - w.x.atan2(w.z);
+            assert!((near - 1.0 - height * 0.8).abs() < height * height);
+            assert!((angle - 0.5 * height * 0.6).abs() < height * height);
+        }
+    }
+}

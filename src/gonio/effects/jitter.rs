@@ -1,0 +1,33 @@
+//! Jitter: at each stop an axis comes to rest a little off, by a new draw of σ = `axes.jitter_deg`.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{Block, Entry, Maker, Pass, stated};
+use crate::geometry::angles::turned;
+use crate::numeric::random::{Purpose, stream};
+
+pub(super) const EFFECT: Entry = Entry {
+    name: "axis jitter",
+    calls: |i| stated(i.axes.jitter_deg, "axes.jitter_deg", "°"),
+    make: |maker: &Maker<'_>| {
+        let sigma = maker.instrument.axes.jitter_deg.to_radians();
+        Some(Box::new(Jitter { seed: maker.seed, sigma }))
+    },
+};
+
+struct Jitter {
+    seed: u64,
+    /// rad.
+    sigma: f64,
+}
+
+impl Pass for Jitter {
+    fn apply(&self, block: &mut Block<'_>) {
+        for (i, reading) in block.readings.iter().enumerate() {
+            let rng = &mut stream(self.seed, Purpose::Jitter, u64::from(reading.stop));
+            let mut draw = || -> f64 { self.sigma * Distribution::<f64>::sample(&StandardNormal, rng) };
+            block.wi[i] = turned(block.wi[i], draw(), draw());
+            block.wo[i] = turned(block.wo[i], draw(), draw());
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! What every reading takes: the light that the sample reflects to the detector, and the exposure.
+//!
+//! A beam whose spot lies on the sample brings each cone of directions the same flux wherever it comes from, so a reading is gain · ⟨f(wi, wo) cosθo⟩
+//! electrons a second, ⟨·⟩ over the cones of source and aperture, where they have a size.
+
+use std::f64::consts::FRAC_1_PI;
+
+use glam::DVec3;
+
+use super::cone::Cones;
+use super::{Block, Maker, Pass};
+use crate::gonio::parts::Reference;
+use crate::gonio::reading::Kind;
+use crate::gonio::simulate::Truth;
+
+/// The pass that turns directions into electrons a second: f·cosθo where source and aperture are points, else its mean.
+pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + 'a> {
+    let half = |deg: f64, name: &str| if left_out.contains(&name) { 0.0 } else { 0.5 * deg.to_radians() };
+    let instrument = maker.instrument;
+    let source = half(instrument.source.divergence_deg, super::divergence::EFFECT.name);
+    let detector = half(instrument.detector.aperture_deg, super::aperture::EFFECT.name);
+    let light = Light {
+        gain: instrument.gain(),
+        truth: maker.truth,
+        standard: Standard::new(&instrument.reference, maker.actual.certificate),
+    };
+    if source == 0.0 && detector == 0.0 {
+        return Box::new(light);
+    }
+    Box::new(Spread { light, cones: Cones::new(source, detector, maker.accuracy) })
+}
+
+/// The BRDF of the reference standard.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::gonio) struct Standard {
+    level: f64,
+    shape: f64,
+    /// cosθi cosθo at the geometry of the certificate.
+    certified: f64,
+}
+
+impl Standard {
+    /// The standard whose certificate is off by the share `error`.
+    pub fn new(reference: &Reference, error: f64) -> Self {
+        let certified = reference.theta_i_deg.to_radians().cos() * reference.theta_o_deg.to_radians().cos();
+        Self { level: reference.reflectance * (1.0 + error) * FRAC_1_PI, shape: reference.shape, certified }
+    }
+
+    /// 1/sr.
+    pub fn value(&self, wi: DVec3, wo: DVec3) -> f64 {
+        self.level * (1.0 + self.shape * (wi.z * wo.z - self.certified))
+    }
+}
+
+/// The geometry that the standard is read at.
+pub(in crate::gonio) fn reference_pair(reference: &Reference) -> (DVec3, DVec3) {
+    use crate::geometry::angles::direction_deg;
+    (direction_deg(reference.theta_i_deg, 180.0), direction_deg(reference.theta_o_deg, 0.0))
+}
+
+struct Light<'a> {
+    gain: f64,
+    truth: &'a Truth<'a>,
+    standard: Standard,
+}
+
+impl Light<'_> {
+    /// Adds weight · f cosθo of what is read; nothing is reflected below the horizon. Where the truth is not known the sum becomes NaN.
+    fn add(&self, kind: Kind, (wi, wo): (DVec3, DVec3), weight: f64, f: &mut [f64], out: &mut [f64]) {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return;
+        }
+        match kind {
+            Kind::Sample if (self.truth)(wi, wo, f) => {}
+            Kind::Sample => f.fill(f64::NAN),
+            Kind::Reference => f.fill(self.standard.value(wi, wo)),
+            Kind::Blank | Kind::Dark => return,
+        }
+        out.iter_mut().zip(f).for_each(|(out, f)| *out += weight * wo.z * *f);
+    }
+}
+
+impl Pass for Light<'_> {
+    fn apply(&self, block: &mut Block<'_>) {
+        let (mut f, mut out) = (vec![0.0; block.width], vec![0.0; block.width]);
+        for (i, reading) in block.readings.iter().enumerate() {
+            out.fill(0.0);
+            self.add(reading.kind, (block.wi[i], block.wo[i]), self.gain, &mut f, &mut out);
+            block.of(i).iter_mut().zip(&out).for_each(|(s, out)| *s *= out);
+        }
+    }
+}
+
+/// Light from a source and to a detector of some size.
+struct Spread<'a> {
+    light: Light<'a>,
+    cones: Cones,
+}
+
+impl Pass for Spread<'_> {
+    fn apply(&self, block: &mut Block<'_>) {
+        let (mut f, mut out) = (vec![0.0; block.width], vec![0.0; block.width]);
+        for (i, reading) in block.readings.iter().enumerate() {
+            let (gain, light) = (self.light.gain, &self.light);
+            let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
+                light.add(reading.kind, (wi, wo), gain * weight, &mut f, out);
+            };
+            let error = self.cones.mean(block.wi[i], block.wo[i], &mut add, &mut out);
+            block.error = block.error.max(error);
+            block.of(i).iter_mut().zip(&out).for_each(|(s, out)| *s *= out);
+        }
+    }
+}
+
+/// Electrons a second to electrons.
+pub(super) struct Exposure;
+
+impl Pass for Exposure {
+    fn apply(&self, block: &mut Block<'_>) {
+        let readings = block.readings;
+        readings.iter().enumerate().for_each(|(i, reading)| block.scale(i, reading.exposure_s));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_standard_has_its_certificate_s_value_at_the_certificate_s_geometry() {
+        let reference = Reference { reflectance: 0.98, shape: 0.3, ..Reference::default() };
+        let (wi, wo) = reference_pair(&reference);
+        let standard = Standard::new(&reference, 0.01);
+        assert!((standard.value(wi, wo) * std::f64::consts::PI / (0.98 * 1.01) - 1.0).abs() < 1e-15);
+        assert!(standard.value(wi, DVec3::new(0.999, 0.0, 0.044)) < standard.value(wi, wo));
+    }
+}

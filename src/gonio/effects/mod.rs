@@ -1,0 +1,130 @@
+//! The effects of a real instrument, one file each, as passes over blocks of readings.
+//!
+//! In: readings with the directions that were meant. Out: electrons, as the converter counts them. Each effect is a [`Pass`] that exists only if
+//! the instrument calls for it; what is off is not among the passes, so that it costs nothing and changes no bit.
+
+mod aperture;
+pub(super) mod cone;
+mod dark;
+mod divergence;
+pub(super) mod footprint;
+pub(super) mod height;
+mod jitter;
+pub(super) mod light;
+mod nonlinearity;
+mod power;
+pub(super) mod quantisation;
+mod read_noise;
+mod saturation;
+pub(super) mod shadow;
+mod shot;
+mod stray;
+pub(super) mod tilt;
+mod zero;
+
+use glam::DVec3;
+
+use super::actual::Actual;
+use super::instrument::Instrument;
+use super::reading::Reading;
+use super::simulate::Truth;
+use crate::control::Plan;
+
+/// Some readings in a row, on their way from directions to electrons.
+pub(super) struct Block<'a> {
+    /// Index of the first in the series.
+    pub first: usize,
+    /// The readings.
+    pub readings: &'a [Reading],
+    /// Directions to source and detector, in the frame of what is read.
+    pub wi: Vec<DVec3>,
+    pub wo: Vec<DVec3>,
+    /// Channels that are read.
+    pub width: usize,
+    /// Electrons a second, later electrons: those of a reading's channels together. NaN where the truth is not known.
+    pub signal: Vec<f64>,
+    /// Largest share by which a quadrature may be off.
+    pub error: f64,
+}
+
+impl Block<'_> {
+    /// Multiplies all channels of reading `i`.
+    fn scale(&mut self, i: usize, factor: f64) {
+        self.of(i).iter_mut().for_each(|s| *s *= factor);
+    }
+
+    /// Adds to all channels of reading `i`.
+    fn add(&mut self, i: usize, more: f64) {
+        self.of(i).iter_mut().for_each(|s| *s += more);
+    }
+
+    fn of(&mut self, i: usize) -> &mut [f64] {
+        &mut self.signal[i * self.width..(i + 1) * self.width]
+    }
+}
+
+/// One step of a reading.
+pub(super) trait Pass: Sync {
+    /// Works on all readings of the block.
+    fn apply(&self, block: &mut Block<'_>);
+}
+
+/// What the passes are made from.
+pub(super) struct Maker<'a> {
+    pub instrument: &'a Instrument,
+    pub actual: &'a Actual,
+    pub truth: &'a Truth<'a>,
+    pub seed: u64,
+    /// Relative error that quadratures may have.
+    pub accuracy: f64,
+}
+
+/// The effect of a file: its name, and whether and why an instrument calls for it.
+struct Entry {
+    name: &'static str,
+    /// `Ok` with the reason for it, `Err` with that against it.
+    calls: fn(&Instrument) -> Result<String, String>,
+    /// Its pass, where it has one of its own.
+    make: for<'a> fn(&Maker<'a>) -> Option<Box<dyn Pass + 'a>>,
+}
+
+/// Effects on where light comes from and goes to.
+const GEOMETRY: [Entry; 6] =
+    [zero::EFFECT, jitter::EFFECT, tilt::EFFECT, height::EFFECT, divergence::EFFECT, aperture::EFFECT];
+/// Effects on the flux, electrons a second.
+const FLUX: [Entry; 5] = [footprint::EFFECT, shadow::EFFECT, stray::EFFECT, power::EFFECT, dark::EFFECT];
+/// Effects on the electrons of a reading.
+const DETECTOR: [Entry; 5] =
+    [shot::EFFECT, saturation::EFFECT, nonlinearity::EFFECT, read_noise::EFFECT, quantisation::EFFECT];
+
+fn effects() -> impl Iterator<Item = &'static Entry> {
+    GEOMETRY.iter().chain(&FLUX).chain(&DETECTOR)
+}
+
+/// Which effects the instrument calls for, in the order in which they act, and why.
+#[must_use]
+pub fn plan(instrument: &Instrument) -> Plan {
+    let mut plan = Plan::default();
+    for effect in effects() {
+        match (effect.calls)(instrument) {
+            Ok(why) => plan.push(effect.name, true, why),
+            Err(why) => plan.push(effect.name, false, why),
+        }
+    }
+    plan
+}
+
+/// The passes of those effects that are on, and not left out by name, among the two that every reading takes: the light and the exposure.
+pub(super) fn passes<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Vec<Box<dyn Pass + 'a>> {
+    let on = |e: &&Entry| (e.calls)(maker.instrument).is_ok() && !left_out.contains(&e.name);
+    let of = |list: &'static [Entry]| list.iter().filter(on).filter_map(|e| (e.make)(maker)).collect::<Vec<_>>();
+    let [geometry, flux, detector] = [of(&GEOMETRY), of(&FLUX), of(&DETECTOR)];
+    let light: Box<dyn Pass + 'a> = light::pass(maker, left_out);
+    let exposure: Box<dyn Pass + 'a> = Box::new(light::Exposure);
+    geometry.into_iter().chain([light]).chain(flux).chain([exposure]).chain(detector).collect()
+}
+
+/// "on" with a number and its unit, "off" for 0.
+fn stated(value: f64, name: &str, unit: &str) -> Result<String, String> {
+    if value > 0.0 { Ok(format!("{name} = {value}{unit}")) } else { Err(format!("{name} = 0")) }
+}

@@ -1,0 +1,27 @@
+//! Read noise: the electronics add normal noise of σ = `read_noise` electrons to each reading.
+
+use super::{Block, Entry, Maker, Pass, stated};
+use crate::gonio::instrument::normal;
+
+pub(super) const EFFECT: Entry = Entry {
+    name: "read noise",
+    calls: |i| match stated(i.read_noise, "read_noise", " electrons") {
+        Ok(_) if !i.is_noisy() => Err("electrons = 0".into()),
+        said => said,
+    },
+    make: |maker: &Maker<'_>| Some(Box::new(ReadNoise { sigma: maker.instrument.read_noise, seed: maker.seed })),
+};
+
+struct ReadNoise {
+    sigma: f64,
+    seed: u64,
+}
+
+impl Pass for ReadNoise {
+    fn apply(&self, block: &mut Block<'_>) {
+        let first = (block.first * block.width) as u64;
+        for (k, signal) in block.signal.iter_mut().enumerate() {
+            *signal += self.sigma * normal(self.seed, first + k as u64);
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! The forward simulation: a truth, an instrument and directions to raw readings.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::actual::Actual;
+use super::effects::light::reference_pair;
+use super::effects::{self, Block, Maker};
+use super::instrument::Instrument;
+use super::raw::Raw;
+use super::reading::{Kind, Reading};
+use super::series::series;
+use super::simulate::Truth;
+use crate::control::Control;
+use crate::measurement::{Directions, Weights};
+use crate::numeric::sum::BLOCK;
+
+/// What is to be read, and how.
+pub struct Job<'a> {
+    /// What stands on the holder.
+    pub truth: &'a Truth<'a>,
+    /// Names of its channels.
+    pub channels: &'a [String],
+    /// The instrument.
+    pub instrument: &'a Instrument,
+    /// Pairs of directions to measure.
+    pub directions: &'a Directions,
+    /// What each of them stands for.
+    pub weights: &'a Weights,
+    /// Seed of the noise and of the instrument's own errors.
+    pub seed: u64,
+    /// Relative error that means over source and aperture may have.
+    pub accuracy: f64,
+    /// Effects that are left out, by name.
+    pub left_out: &'a [&'a str],
+}
+
+/// The relative error of means over source and aperture, if nothing else is asked for.
+pub const ACCURACY: f64 = 1e-6;
+
+impl Job<'_> {
+    /// Reads all pairs of directions above the horizon, with this instrument's own errors.
+    #[must_use]
+    pub fn run(&self, control: Control<'_>) -> Raw {
+        let is_lit = |entry: &u32| {
+            let (wi, wo) = self.directions.pair(*entry as usize);
+            wi.z > 0.0 && wo.z > 0.0
+        };
+        let entries: Vec<u32> = (0..self.directions.len() as u32).filter(is_lit).collect();
+        let readings = series(self.instrument, &entries);
+        let actual = Actual::draw(self.instrument, &readings, self.seed);
+        self.read(readings, &actual, control)
+    }
+
+    /// Reads everything by an instrument with the errors `actual`.
+    #[must_use]
+    pub fn read(&self, readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
+        let Self { truth, instrument, seed, accuracy, .. } = *self;
+        let passes = effects::passes(&Maker { instrument, actual, truth, seed, accuracy }, self.left_out);
+        let (n, width) = (readings.len(), self.channels.len());
+        control.progress.start("reading", n as u64);
+        let blocks: Vec<(Vec<f64>, f64)> = (0..n.div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|b| {
+                let range = b * BLOCK..((b + 1) * BLOCK).min(n);
+                let mut block = self.block(&readings[range.clone()], range.start);
+                if control.stop.requested() {
+                    block.signal.fill(f64::NAN); // not read
+                } else {
+                    passes.iter().for_each(|pass| pass.apply(&mut block));
+                }
+                control.progress.advance(range.len() as u64);
+                (block.signal, block.error)
+            })
+            .collect();
+        control.progress.finish();
+        let quadrature_error = blocks.iter().map(|b| b.1).fold(0.0, f64::max);
+        let mut signal = Vec::with_capacity(n * width);
+        blocks.into_iter().for_each(|(part, _)| signal.extend(part));
+        Raw {
+            channels: self.channels.to_vec(),
+            directions: self.directions.clone(),
+            weights: self.weights.clone(),
+            readings,
+            signal,
+            quadrature_error,
+        }
+    }
+
+    /// Readings in the directions that are meant, the signal 1 yet.
+    fn block<'b>(&self, readings: &'b [Reading], first: usize) -> Block<'b> {
+        let pair = |reading: &Reading| match (reading.kind, reading.entry) {
+            (Kind::Sample, Some(entry)) => self.directions.pair(entry as usize),
+            (Kind::Reference, _) => reference_pair(&self.instrument.reference),
+            _ => (DVec3::Z, DVec3::Z),
+        };
+        let (wi, wo) = readings.iter().map(pair).unzip();
+        let width = self.channels.len();
+        Block { first, readings, wi, wo, width, signal: vec![1.0; readings.len() * width], error: 0.0 }
+    }
+}

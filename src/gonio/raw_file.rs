@@ -1,0 +1,278 @@
+//! Raw readings as a CSV file: the four angles, `kind`, `time_s`, `exposure_s`, `repeat`, and one `signal_<channel>` each.
+//!
+//! Columns stand in any order. Rows are in order of time; angles may be empty in a row that is no `sample`, a signal where nothing was read. Rows of one
+//! kind and pair of directions in a row are one stop of the axes. `# instrument: {…}`, JSON on one line, describes what made them, and `weight`,
+//! a column that simulated files have, holds what a pair of directions stands for (`# weights: solid-angle`: the grid's solid angle).
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::instrument::Instrument;
+use super::raw::Raw;
+use super::reading::{Kind, Reading};
+use crate::geometry::angles::direction_deg;
+use crate::measurement::formats::{is_reserved, push_number, spherical_deg};
+use crate::measurement::{Directions, MeasurementError, Weights};
+
+const ANGLES: [&str; 4] = ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"];
+const PLACES: [&str; 4] = ["kind", "time_s", "exposure_s", "repeat"];
+const SIGNAL: &str = "signal_";
+const WEIGHT: &str = "weight";
+const INSTRUMENT: &str = "# instrument:";
+const SOLID_ANGLE: &str = "# weights: solid-angle";
+/// Largest magnitudes of the four angles, with room for rounding.
+const LARGEST: [f64; 4] = [180.0001, 360.0001, 180.0001, 360.0001];
+
+impl Raw {
+    /// The text of a file.
+    #[must_use]
+    pub fn to_csv(&self, instrument: &Instrument) -> String {
+        let mut text = String::new();
+        // Writing to a String can't fail.
+        let _ = writeln!(text, "{INSTRUMENT} {}", serde_json::to_string(instrument).unwrap_or_default());
+        if matches!(self.weights, Weights::SolidAngle(_) | Weights::Merl) {
+            let _ = writeln!(text, "{SOLID_ANGLE}");
+        }
+        let names = ANGLES.iter().chain(&PLACES).map(ToString::to_string);
+        let signals = self.channels.iter().map(|c| format!("{SIGNAL}{c}"));
+        let weight = self.weights.known().then(|| WEIGHT.to_string());
+        let header: Vec<String> = names.chain(signals).chain(weight).collect();
+        text.push_str(&header.join(","));
+        text.push('\n');
+        for (i, reading) in self.readings.iter().enumerate() {
+            self.push_row(i, reading, &mut text);
+        }
+        text
+    }
+
+    fn push_row(&self, i: usize, reading: &Reading, text: &mut String) {
+        match reading.entry.map(|e| self.directions.pair(e as usize)) {
+            Some((wi, wo)) => {
+                [spherical_deg(wi), spherical_deg(wo)].into_iter().flatten().for_each(|a| push_number(text, a));
+            }
+            None => text.push_str(",,,,"),
+        }
+        text.push_str(reading.kind.name());
+        text.push(',');
+        [reading.time_s, reading.exposure_s, f64::from(reading.repeat)].into_iter().for_each(|v| push_number(text, v));
+        self.signals(i).iter().for_each(|s| push_number(text, *s));
+        if self.weights.known() {
+            push_number(text, reading.entry.map_or(f64::NAN, |e| self.weights.get(e as usize)));
+        }
+        text.pop();
+        text.push('\n');
+    }
+
+    /// Reads the text of a file called `path`, and the description of the instrument where it holds one.
+    ///
+    /// # Errors
+    /// [`MeasurementError`] naming line, column, what was expected and found.
+    pub fn from_csv(path: &Path, text: &str) -> Result<(Self, Option<Instrument>), MeasurementError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let instrument = described(path, text)?;
+        let mut reader = ::csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(::csv::Trim::All)
+            .has_headers(true)
+            .from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|e| malformed(path, &e))?.clone();
+        let columns = Columns::new(path, &header)?;
+        let mut rows = Rows { path, columns: &columns, list: List::default() };
+        for record in reader.records() {
+            let record = record.map_err(|e| malformed(path, &e))?;
+            rows.take(&record)?;
+        }
+        let is_grid = text.lines().take_while(|l| l.starts_with('#')).any(|l| l.trim_end() == SOLID_ANGLE);
+        rows.list.finish(path, &columns, is_grid).map(|raw| (raw, instrument))
+    }
+}
+
+/// The instrument of the comment that describes it.
+fn described(path: &Path, text: &str) -> Result<Option<Instrument>, MeasurementError> {
+    let comments = text.lines().enumerate().take_while(|(_, l)| l.starts_with('#'));
+    let mut found = comments.filter_map(|(i, l)| l.strip_prefix(INSTRUMENT).map(|json| (i + 1, json.trim())));
+    let Some((line, json)) = found.next() else { return Ok(None) };
+    let wrong = |found: String| {
+        MeasurementError::invalid(
+            path,
+            format!("line {line}, `{INSTRUMENT}`"),
+            "the description of an instrument",
+            found,
+        )
+    };
+    let instrument: Instrument = serde_json::from_str(json).map_err(|e| wrong(e.to_string()))?;
+    match instrument.fault() {
+        Some(fault) => Err(wrong(fault)),
+        None => Ok(Some(instrument)),
+    }
+}
+
+fn malformed(path: &Path, error: &::csv::Error) -> MeasurementError {
+    let place = error.position().map_or("the header".to_owned(), |p| format!("line {}", p.line()));
+    let found = match error.kind() {
+        ::csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            return MeasurementError::invalid(
+                path,
+                place,
+                format!("{expected_len} cells, one a column of the header"),
+                len.to_string(),
+            );
+        }
+        _ => error.to_string(),
+    };
+    MeasurementError::invalid(path, place, "rows of raw readings", found)
+}
+
+/// Where the columns stand.
+struct Columns {
+    angles: [usize; 4],
+    /// kind, `time_s`, `exposure_s`, repeat.
+    places: [usize; 4],
+    channels: Vec<(String, usize)>,
+    weight: Option<usize>,
+}
+
+impl Columns {
+    fn new(path: &Path, header: &::csv::StringRecord) -> Result<Self, MeasurementError> {
+        let wrong = |expected: String, found: String| MeasurementError::invalid(path, "the header", expected, found);
+        let mut seen = HashMap::new();
+        for (column, name) in header.iter().enumerate() {
+            if seen.insert(name, column).is_some() {
+                return Err(wrong("each column once".into(), format!("`{name}` twice")));
+            }
+        }
+        let find = |name: &str| {
+            seen.get(name)
+                .copied()
+                .ok_or_else(|| wrong(format!("a column `{name}`"), format!("{:?}", header.iter().collect::<Vec<_>>())))
+        };
+        let all = |names: [&str; 4]| -> Result<[usize; 4], MeasurementError> {
+            Ok([find(names[0])?, find(names[1])?, find(names[2])?, find(names[3])?])
+        };
+        let (angles, places) = (all(ANGLES)?, all(PLACES)?);
+        let mut channels = Vec::new();
+        for (column, name) in header.iter().enumerate() {
+            match name.strip_prefix(SIGNAL) {
+                Some(channel) if is_reserved(channel) => {
+                    return Err(wrong("a channel's name".into(), format!("`{name}`")));
+                }
+                Some(channel) => channels.push((channel.to_owned(), column)),
+                None if name == WEIGHT || ANGLES.contains(&name) || PLACES.contains(&name) => {}
+                None => {
+                    return Err(wrong(format!("angles, {} or `{SIGNAL}…`", PLACES.join(", ")), format!("`{name}`")));
+                }
+            }
+        }
+        if channels.is_empty() {
+            return Err(wrong(format!("a column `{SIGNAL}…`"), "none".into()));
+        }
+        Ok(Self { angles, places, channels, weight: seen.get(WEIGHT).copied() })
+    }
+}
+
+/// What has been read so far.
+#[derive(Default)]
+struct List {
+    entries: HashMap<[u64; 4], u32>,
+    wi: Vec<DVec3>,
+    wo: Vec<DVec3>,
+    weight: Vec<f64>,
+    readings: Vec<Reading>,
+    signal: Vec<f64>,
+}
+
+impl List {
+    fn finish(self, path: &Path, columns: &Columns, is_grid: bool) -> Result<Raw, MeasurementError> {
+        if self.readings.is_empty() {
+            return Err(MeasurementError::invalid(path, "after the header", "a row of data", "the end of the file"));
+        }
+        let weights = match (columns.weight, is_grid) {
+            (None, _) => Weights::Uniform,
+            (Some(_), true) => Weights::SolidAngle(self.weight),
+            (Some(_), false) => Weights::Column(self.weight),
+        };
+        Ok(Raw {
+            channels: columns.channels.iter().map(|(name, _)| name.clone()).collect(),
+            directions: Directions::List { wi: self.wi, wo: self.wo },
+            weights,
+            readings: self.readings,
+            signal: self.signal,
+            quadrature_error: 0.0,
+        })
+    }
+}
+
+struct Rows<'a> {
+    path: &'a Path,
+    columns: &'a Columns,
+    list: List,
+}
+
+impl Rows<'_> {
+    fn take(&mut self, record: &::csv::StringRecord) -> Result<(), MeasurementError> {
+        let line = record.position().map_or(0, ::csv::Position::line);
+        let path = self.path;
+        let wrong = |column: &str, expected: &str, found: &str| {
+            MeasurementError::invalid(path, format!("line {line}, column `{column}`"), expected, format!("{found:?}"))
+        };
+        let cell = |column: usize| record.get(column).unwrap_or_default();
+        let number = |column: usize, name: &str, least: f64, expected: &str| {
+            let text = cell(column);
+            text.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= least).ok_or_else(|| wrong(name, expected, text))
+        };
+        let [kind, time, exposure, repeat] = self.columns.places;
+        let kind = Kind::ALL
+            .into_iter()
+            .find(|k| k.name() == cell(kind))
+            .ok_or_else(|| wrong("kind", "sample, blank, reference or dark", cell(kind)))?;
+        let time_s = number(time, "time_s", 0.0, "seconds from the start")?;
+        let before = self.list.readings.last().copied();
+        if before.is_some_and(|b| time_s < b.time_s) {
+            return Err(wrong("time_s", "rows in order of time", cell(time)));
+        }
+        let exposure_s = number(exposure, "exposure_s", f64::MIN_POSITIVE, "seconds, above 0")?;
+        let repeat = cell(repeat).parse().map_err(|_| wrong("repeat", "a whole number from 0", cell(repeat)))?;
+        let entry = if kind == Kind::Sample { Some(self.entry(record, &wrong)?) } else { None };
+        for (name, column) in &self.columns.channels {
+            let text = cell(*column);
+            let signal = if text.is_empty() { Ok(f64::NAN) } else { text.parse() };
+            let signal = signal.map_err(|_| wrong(&format!("{SIGNAL}{name}"), "a number, or nothing", text))?;
+            self.list.signal.push(signal);
+        }
+        let stop = before.map_or(0, |b| b.stop + u32::from(b.kind != kind || b.entry != entry));
+        self.list.readings.push(Reading { kind, entry, time_s, exposure_s, repeat, stop });
+        Ok(())
+    }
+
+    /// The pair of directions of a row of the sample.
+    fn entry(
+        &mut self,
+        record: &::csv::StringRecord,
+        wrong: &impl Fn(&str, &str, &str) -> MeasurementError,
+    ) -> Result<u32, MeasurementError> {
+        let mut angles = [0.0; 4];
+        for (k, (angle, column)) in angles.iter_mut().zip(self.columns.angles).enumerate() {
+            let text = record.get(column).unwrap_or_default();
+            let parsed = text.parse::<f64>().ok().filter(|a| a.abs() <= LARGEST[k]);
+            *angle = parsed.ok_or_else(|| wrong(ANGLES[k], "an angle in degrees", text))?;
+        }
+        // −0 is 0.
+        let key = angles.map(|a| (a + 0.0).to_bits());
+        if let Some(entry) = self.list.entries.get(&key) {
+            return Ok(*entry);
+        }
+        if let Some(column) = self.columns.weight {
+            let text = record.get(column).unwrap_or_default();
+            let weight = text.parse::<f64>().ok().filter(|w| w.is_finite() && *w >= 0.0);
+            self.list.weight.push(weight.ok_or_else(|| wrong(WEIGHT, "a number ≥ 0", text))?);
+        }
+        let entry = self.list.wi.len() as u32;
+        self.list.entries.insert(key, entry);
+        self.list.wi.push(direction_deg(angles[0], angles[1]));
+        self.list.wo.push(direction_deg(angles[2], angles[3]));
+        Ok(entry)
+    }
+}

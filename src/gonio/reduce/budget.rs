@@ -1,0 +1,69 @@
+//! The uncertainty budget: component, standard uncertainty, and how it is known.
+
+/// How a component is evaluated (GUM).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub enum Type {
+    /// By the scatter of readings.
+    A,
+    /// By other knowledge: certificates, specifications.
+    B,
+}
+
+impl Type {
+    /// A or B.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::A => "A",
+            Self::B => "B",
+        }
+    }
+}
+
+/// A component over the whole scan.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Line {
+    /// What it is.
+    pub name: &'static str,
+    /// How it is known.
+    #[serde(rename = "type")]
+    pub kind: Type,
+    /// Standard uncertainty that it brings to a reading, root of the mean square over all valid readings, 1/sr.
+    pub rms: f64,
+    /// The same relative to each reading, median over the readings.
+    pub relative: f64,
+}
+
+/// All components, summed up and reading by reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// Components that there are, and all together.
+    pub lines: Vec<Line>,
+    /// Each component's variance in every reading, channel-major, in the order of `lines`, without the last.
+    variances: Vec<Vec<f64>>,
+}
+
+impl Budget {
+    pub(super) fn new(parts: Vec<(&'static str, Type, Vec<f64>)>, values: &[f64]) -> Self {
+        let parts: Vec<_> = parts.into_iter().filter(|(_, _, v)| v.iter().any(|v| *v > 0.0)).collect();
+        let total: Vec<f64> = (0..values.len()).map(|i| parts.iter().map(|(_, _, v)| v[i]).sum()).collect();
+        let mut lines: Vec<Line> = parts.iter().map(|(name, kind, v)| line(name, *kind, v, values)).collect();
+        lines.push(line("all together", Type::B, &total, values));
+        Self { lines, variances: parts.into_iter().map(|(_, _, v)| v).collect() }
+    }
+
+    /// Standard uncertainty that component `line` brings to reading `place` (channel-major).
+    #[must_use]
+    pub fn contribution(&self, line: usize, place: usize) -> f64 {
+        self.variances[line][place].sqrt()
+    }
+}
+
+fn line(name: &'static str, kind: Type, variances: &[f64], values: &[f64]) -> Line {
+    let valid = || values.iter().zip(variances).filter(|(v, _)| v.is_finite());
+    let count = valid().count().max(1) as f64;
+    let rms = (valid().map(|(_, u)| u).sum::<f64>() / count).sqrt();
+    let mut shares: Vec<f64> = valid().filter(|(v, _)| **v != 0.0).map(|(v, u)| u.sqrt() / v.abs()).collect();
+    shares.sort_by(f64::total_cmp);
+    Line { name, kind, rms, relative: shares.get(shares.len() / 2).copied().unwrap_or(0.0) }
+}

@@ -1,0 +1,238 @@
+//! The way back: raw readings to BRDF ± σ, with what readings share.
+//!
+//! Per reading f = (s − b)/(r − b) · f_ref cosθref share_ref/(cosθo share), all of them rates: s the sample's, b the blank's (else the dark's), r the
+//! reference's, b and r interpolated between the visits before and after. Without a reference the gain is taken as stated. What is
+//! measured is f averaged over the cones of source and aperture, weighed by cosθo.
+
+mod budget;
+pub(super) mod positions;
+mod shared;
+mod stops;
+mod visits;
+
+use glam::DVec3;
+
+pub use budget::{Budget, Line, Type};
+
+use self::shared::Shared;
+use self::stops::{Rate, Stop};
+use self::visits::Visits;
+use super::effects::footprint::Footprint;
+use super::effects::light::{Standard, reference_pair};
+use super::effects::shadow::may_be_shadowed;
+use super::instrument::Instrument;
+use super::raw::Raw;
+use super::reading::Kind;
+use super::simulate::Truth;
+use crate::measurement::{Dimension, Masked, Measurement};
+
+/// Why raw readings can't be reduced.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReduceError {
+    /// No reading of the sample.
+    #[error("no reading of the sample")]
+    NoSample,
+    /// The instrument has no reference and its gain is not known either.
+    #[error(
+        "there is neither a reading of the reference (with instrument.reference.reflectance) nor a gain (instrument.electrons)"
+    )]
+    NoScale,
+    /// Readings of the reference without its certificate.
+    #[error("the reference was read, but its reflectance is not stated (instrument.reference.reflectance)")]
+    NoCertificate,
+}
+
+/// Readings, reduced.
+#[derive(Debug)]
+pub struct Reduction {
+    /// The BRDF with σ and shared components.
+    pub measurement: Measurement,
+    /// Where the uncertainty comes from.
+    pub budget: Budget,
+}
+
+/// Reduces readings that an instrument of this description made. `model` is the material, about: errors of positions are worked out from its
+/// slopes; without it they are left out, and a note says so.
+///
+/// # Errors
+/// [`ReduceError`].
+pub fn reduce(
+    name: &str,
+    raw: &Raw,
+    instrument: &Instrument,
+    model: Option<&Truth<'_>>,
+) -> Result<Reduction, ReduceError> {
+    let stops = stops::stops(raw, instrument);
+    let has_reference = stops.iter().any(|s| s.kind == Kind::Reference);
+    if !stops.iter().any(|s| s.kind == Kind::Sample) {
+        return Err(ReduceError::NoSample);
+    }
+    if has_reference != instrument.has_reference() {
+        return Err(if has_reference { ReduceError::NoCertificate } else { ReduceError::NoScale });
+    }
+    if !has_reference && !instrument.is_noisy() && instrument.gain() != 1.0 {
+        return Err(ReduceError::NoScale);
+    }
+    let visits = Visits::new(&stops, raw.channels.len(), instrument);
+    Ok(Work { raw, instrument, scale: Scale::new(instrument), visits }.run(name, &stops, model))
+}
+
+/// What turns a net rate into a BRDF.
+struct Scale {
+    footprint: Option<Footprint>,
+    /// f_ref cosθref share_ref; where there is no reference, 1 over the gain.
+    reference: f64,
+}
+
+impl Scale {
+    fn new(instrument: &Instrument) -> Self {
+        let footprint = Footprint::of(instrument);
+        let (wi, wo) = reference_pair(&instrument.reference);
+        let share = footprint.map_or(1.0, |f| f.share(wi, wo));
+        let standard = Standard::new(&instrument.reference, 0.0);
+        let of_standard = standard.value(wi, wo) * wo.z * share;
+        Self { footprint, reference: if instrument.has_reference() { of_standard } else { 1.0 / instrument.gain() } }
+    }
+
+    /// BRDF over (net rate / reference's net rate), or over the net rate.
+    fn of(&self, wi: DVec3, wo: DVec3) -> f64 {
+        self.reference / (wo.z * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
+    }
+}
+
+struct Work<'a> {
+    raw: &'a Raw,
+    instrument: &'a Instrument,
+    scale: Scale,
+    visits: Visits,
+}
+
+/// Why entries have no value.
+#[derive(Default)]
+struct Left {
+    saturated: u64,
+    shadowed: u64,
+    unlit: u64,
+}
+
+impl Work<'_> {
+    fn run(self, name: &str, stops: &[Stop], model: Option<&Truth<'_>>) -> Reduction {
+        let (n, width) = (self.raw.directions.len(), self.raw.channels.len());
+        let mut table = Table { values: vec![f64::NAN; n * width], variance: vec![0.0; n * width] };
+        let mut shared = Shared::new(n, width, &self.visits, self.instrument);
+        let mut left = Left::default();
+        let samples: Vec<(&Stop, usize)> = stops
+            .iter()
+            .filter(|s| s.kind == Kind::Sample)
+            .filter_map(|s| s.entry.map(|e| (s, e as usize)).filter(|(_, e)| *e < n))
+            .collect();
+        // Of a pair that was read at several stops the mean counts.
+        let mut times = vec![0u32; n * width];
+        for (stop, entry) in &samples {
+            (0..width).filter(|c| stop.rates[*c].is_some()).for_each(|c| times[c * n + entry] += 1);
+        }
+        for (stop, entry) in samples {
+            self.entry(stop, entry, &times, &mut table, &mut shared, &mut left);
+        }
+        if let Some(model) = model {
+            positions::add(self.raw, self.instrument, model, &table, &mut shared);
+        }
+        let budget = shared.budget(&table);
+        shared.own_into(&mut table);
+        let mut notes = left.notes(width);
+        if model.is_none() && positions::matter(self.instrument) {
+            notes.push(
+                "errors of positions are not in σ: there was no model of the material to tell their effect".into(),
+            );
+        }
+        let marked = table.values.iter().filter(|v| v.is_nan()).count() as u64;
+        let measurement = Measurement {
+            notes,
+            origin: format!("reduced from {} readings", self.raw.readings.len()),
+            dimension: Dimension::Space,
+            weights: self.raw.weights.clone(),
+            masked: Masked { marked, ..Masked::default() },
+            sigma: self.instrument.is_noisy().then(|| table.sigma()),
+            common: shared.planes(),
+            ..Measurement::new(name, self.raw.directions.clone(), self.raw.channels.clone(), table.values)
+        };
+        Reduction { measurement, budget }
+    }
+
+    /// Reduces one stop at a pair of directions.
+    fn entry(
+        &self,
+        stop: &Stop,
+        entry: usize,
+        times: &[u32],
+        table: &mut Table,
+        shared: &mut Shared<'_>,
+        left: &mut Left,
+    ) {
+        let (wi, wo) = self.raw.directions.pair(entry);
+        let factor = self.scale.of(wi, wo);
+        let n = self.raw.directions.len();
+        for (c, rate) in stop.rates.iter().enumerate() {
+            let place = c * n + entry;
+            if may_be_shadowed(wi, wo, self.instrument) {
+                left.shadowed += 1;
+                continue;
+            }
+            if !factor.is_finite() || wi.z <= 0.0 || wo.z <= 0.0 {
+                left.unlit += 1;
+                continue;
+            }
+            let &Some(rate) = rate else {
+                left.saturated += u64::from(times[place] == 0);
+                continue;
+            };
+            let at = self.visits.at(stop.time_s, c);
+            let share = 1.0 / f64::from(times[place]);
+            let conversion = share * factor / at.reference;
+            let value = conversion * (rate.mean - at.base);
+            let sum = &mut table.values[place];
+            *sum = if sum.is_nan() { value } else { *sum + value };
+            shared.reading(place, c, &Reduced { value, conversion, rate, at, time_s: stop.time_s });
+        }
+    }
+}
+
+/// Values and their independent variances, channel-major.
+struct Table {
+    values: Vec<f64>,
+    variance: Vec<f64>,
+}
+
+impl Table {
+    /// Independent σ of every value, NaN where there is none.
+    fn sigma(&self) -> Vec<f64> {
+        let of = |(value, variance): (&f64, &f64)| if value.is_nan() { f64::NAN } else { variance.sqrt() };
+        self.values.iter().zip(&self.variance).map(of).collect()
+    }
+}
+
+/// A reduced reading, and what it was made from.
+struct Reduced {
+    value: f64,
+    /// BRDF over net rate.
+    conversion: f64,
+    rate: Rate,
+    at: visits::At,
+    time_s: f64,
+}
+
+impl Left {
+    fn notes(&self, width: usize) -> Vec<String> {
+        let pairs = |count: u64, why: &str| {
+            let count = count.div_ceil(width.max(1) as u64);
+            (count > 0).then(|| format!("{count} pairs of directions are masked: {why}"))
+        };
+        let list = [
+            pairs(self.saturated, "even the shortest exposure saturated, or nothing was read"),
+            pairs(self.shadowed, "source and detector shadow each other there, or may"),
+            pairs(self.unlit, "below the horizon, or no light of the beam counts there"),
+        ];
+        list.into_iter().flatten().collect()
+    }
+}

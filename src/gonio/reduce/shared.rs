@@ -1,0 +1,192 @@
+//! What readings share, as components of the measurement's error.
+//!
+//! The noise of a visit is in all readings between it and the next ones; a certificate's error is in all. Each is a component: 1 σ of it in every
+//! reading, fully correlated. Visits are many in a long scan, and components cost memory, so g visits in a row may be one: then a share 1/g
+//! of the variance is common and the rest counts as each reading's own, which keeps the variance of a reading and of the mean over the group.
+
+use super::budget::{Budget, Type};
+use super::visits::Visits;
+use super::{Reduced, Table};
+use crate::gonio::instrument::Instrument;
+
+/// Most components of one kind of visits' errors, and most numbers that all may take.
+const MOST_GROUPS: usize = 6;
+const MOST_NUMBERS: usize = 50_000_000;
+/// Terms of the series of a walk that is known at both ends.
+const MODES: usize = 2;
+
+/// One component and what it belongs to.
+struct Component {
+    family: usize,
+    /// 1 σ in every reading, channel-major.
+    plane: Vec<f64>,
+}
+
+/// A line of the budget.
+struct Family {
+    name: &'static str,
+    kind: Type,
+    /// Variance that is not in any component, by reading; empty for none.
+    own: Vec<f64>,
+}
+
+/// All of them.
+pub(super) struct Shared<'a> {
+    instrument: &'a Instrument,
+    size: usize,
+
+    families: Vec<Family>,
+    components: Vec<Component>,
+    /// Component of (family, group of visits, channel or mode).
+    places: std::collections::HashMap<(usize, usize, usize), usize>,
+    /// Visits that are one component.
+    group: usize,
+    has_visits: [bool; 2],
+}
+
+/// Families in the order of the budget.
+pub(super) const READING: usize = 0;
+const REFERENCE: usize = 1;
+const BASE: usize = 2;
+const CERTIFICATE: usize = 3;
+const DRIFT: usize = 4;
+const DARK: usize = 5;
+const NONLINEARITY: usize = 6;
+pub(super) const ZEROS: usize = 7;
+pub(super) const TILT: usize = 8;
+pub(super) const HEIGHT: usize = 9;
+pub(super) const JITTER: usize = 10;
+const NAMES: [(&str, Type); 11] = [
+    ("noise of the reading", Type::A),
+    ("noise of the reference's readings", Type::A),
+    ("noise of blank and dark", Type::A),
+    ("certificate of the reference", Type::B),
+    ("source drift", Type::B),
+    ("dark drift", Type::B),
+    ("nonlinearity", Type::B),
+    ("axis zeros", Type::B),
+    ("sample tilt", Type::B),
+    ("sample height", Type::B),
+    ("axis jitter", Type::B),
+];
+
+impl<'a> Shared<'a> {
+    pub fn new(entries: usize, width: usize, visits: &Visits, instrument: &'a Instrument) -> Self {
+        let size = entries * width;
+        let afforded = (MOST_NUMBERS / size.max(1) / (2 * width + 2 * MODES + 1)).clamp(1, MOST_GROUPS);
+        let families = NAMES.map(|(name, kind)| Family { name, kind, own: Vec::new() }).into_iter().collect();
+        Self {
+            instrument,
+            size,
+
+            families,
+            components: Vec::new(),
+            places: std::collections::HashMap::new(),
+            group: visits.len().div_ceil(afforded).max(1),
+            has_visits: visits.has,
+        }
+    }
+
+    /// Adds 1 σ of a component at a reading.
+    pub fn add(&mut self, family: usize, part: (usize, usize), place: usize, u: f64) {
+        if u == 0.0 {
+            return;
+        }
+        let (size, list) = (self.size, &mut self.components);
+        let component = *self.places.entry((family, part.0, part.1)).or_insert_with(|| {
+            list.push(Component { family, plane: vec![0.0; size] });
+            list.len() - 1
+        });
+        self.components[component].plane[place] += u;
+    }
+
+    /// Adds a variance of a reading's own.
+    pub fn add_own(&mut self, family: usize, place: usize, variance: f64) {
+        let own = &mut self.families[family].own;
+        if own.is_empty() {
+            own.resize(self.size, 0.0);
+        }
+        own[place] += variance;
+    }
+
+    /// Adds an error that all readings between visits share, by group.
+    fn add_grouped(&mut self, family: usize, visit: usize, part: usize, place: usize, u: f64) {
+        let count = self.group as f64;
+        self.add(family, (visit / self.group, part), place, u / count.sqrt());
+        if self.group > 1 {
+            self.add_own(family, place, u * u * (1.0 - 1.0 / count));
+        }
+    }
+
+    /// Adds all that one reduced reading has of errors that do not depend on positions.
+    pub fn reading(&mut self, place: usize, channel: usize, of: &Reduced) {
+        let Reduced { value, conversion, rate, at, .. } = *of;
+        self.add_own(READING, place, conversion * conversion * rate.variance);
+        let [has_base, has_reference] = self.has_visits;
+        for (k, (visit, share)) in at.visits.into_iter().enumerate() {
+            if has_reference {
+                let u = -value / at.reference * share * at.reference_sigma[k];
+                self.add_grouped(REFERENCE, visit, channel, place, u);
+            }
+            if has_base {
+                let through_reference = if has_reference { value / at.reference } else { 0.0 };
+                let u = (through_reference - conversion) * share * at.base_sigma[k];
+                self.add_grouped(BASE, visit, channel, place, u);
+            }
+        }
+        self.add(CERTIFICATE, (0, 0), place, value * self.instrument.reference.reflectance_u);
+        let drift = self.instrument.source.drift_per_sqrt_hour;
+        if has_reference {
+            self.bridge(DRIFT, place, of, value * drift);
+        } else {
+            // Nothing tells how far the power has walked since the start.
+            self.add(DRIFT, (0, 0), place, value * drift * (of.time_s / 3600.0).sqrt());
+        }
+        self.bridge(DARK, place, of, conversion * self.instrument.detector.dark_drift_per_sqrt_hour);
+        let detector = &self.instrument.detector;
+        if detector.nonlinearity_u > 0.0 {
+            let of_reference = if has_reference { value * at.reference_signal } else { 0.0 };
+            let bent = conversion * rate.mean * rate.signal - of_reference;
+            self.add(NONLINEARITY, (0, 0), place, detector.nonlinearity_u / detector.full_well * bent);
+        }
+    }
+
+    /// A walk of σ `per_sqrt_hour` that two visits know the ends of: a Brownian bridge, √2 Σ sin(mπτ)/(mπ) times normal numbers and √span.
+    fn bridge(&mut self, family: usize, place: usize, of: &Reduced, per_sqrt_hour: f64) {
+        let sigma = per_sqrt_hour * (of.at.span_s / 3600.0).sqrt();
+        let (interval, late) = (of.at.visits[0].0, of.at.visits[1].1);
+        let mut left = late * (1.0 - late);
+        for mode in 1..=MODES {
+            let at = std::f64::consts::PI * mode as f64;
+            let share = 2f64.sqrt() * (at * late).sin() / at;
+            left -= share * share;
+            self.add_grouped(family, interval, mode, place, sigma * share);
+        }
+        if sigma != 0.0 {
+            self.add_own(family, place, sigma * sigma * left.max(0.0));
+        }
+    }
+
+    /// The variance of each reading that it shares with no other, added up into the table.
+    pub fn own_into(&self, table: &mut Table) {
+        for family in self.families.iter().filter(|f| !f.own.is_empty()) {
+            table.variance.iter_mut().zip(&family.own).for_each(|(to, own)| *to += own);
+        }
+    }
+
+    /// Where the uncertainty comes from.
+    pub fn budget(&self, table: &Table) -> Budget {
+        let mut variances: Vec<Vec<f64>> =
+            self.families.iter().map(|f| if f.own.is_empty() { vec![0.0; self.size] } else { f.own.clone() }).collect();
+        for Component { family, plane } in &self.components {
+            variances[*family].iter_mut().zip(plane).for_each(|(to, u)| *to += u * u);
+        }
+        let lines = self.families.iter().zip(variances).map(|(f, variance)| (f.name, f.kind, variance));
+        Budget::new(lines.collect(), &table.values)
+    }
+
+    /// The components' planes.
+    pub fn planes(self) -> Vec<Vec<f64>> {
+        self.components.into_iter().map(|c| c.plane).collect()
+    }
+}

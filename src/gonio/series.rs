@@ -1,0 +1,90 @@
+//! The order of readings: blocks of pairs of directions, with visits to the reference, the blank and the dark between them.
+
+use super::instrument::Instrument;
+use super::reading::{Kind, Reading};
+
+/// The readings that measure these pairs of directions, in order of time.
+#[must_use]
+pub fn series(instrument: &Instrument, entries: &[u32]) -> Vec<Reading> {
+    let mut list = Series { instrument, clock: 0.0, stop: 0, readings: Vec::new() };
+    for block in entries.chunks(instrument.protocol.block as usize) {
+        list.visit();
+        for &entry in block {
+            list.turn(instrument.axes.move_s);
+            for &exposure_s in &instrument.detector.exposures_s {
+                list.read(Kind::Sample, Some(entry), exposure_s, instrument.readings);
+            }
+        }
+    }
+    list.visit();
+    list.readings
+}
+
+struct Series<'a> {
+    instrument: &'a Instrument,
+    clock: f64,
+    stop: u32,
+    readings: Vec<Reading>,
+}
+
+impl Series<'_> {
+    fn turn(&mut self, seconds: f64) {
+        self.clock += seconds;
+        self.stop += 1;
+    }
+
+    fn read(&mut self, kind: Kind, entry: Option<u32>, exposure_s: f64, repeats: u32) {
+        for repeat in 0..repeats {
+            self.readings.push(Reading { kind, entry, time_s: self.clock, exposure_s, repeat, stop: self.stop });
+            self.clock += exposure_s;
+        }
+    }
+
+    /// Reads what readings of the sample are compared with, as far as the instrument needs it.
+    fn visit(&mut self) {
+        let instrument = self.instrument;
+        let exposures = &instrument.detector.exposures_s;
+        let longest = exposures.last().copied().unwrap_or(1.0);
+        let repeats = instrument.protocol.repeats;
+        if instrument.has_reference() {
+            self.turn(instrument.axes.move_s);
+            for &exposure in exposures {
+                self.read(Kind::Reference, None, exposure, repeats);
+            }
+        }
+        if instrument.surroundings.stray_per_sr > 0.0 {
+            self.turn(0.0);
+            self.read(Kind::Blank, None, longest, repeats);
+        }
+        if instrument.has_dark() {
+            self.turn(0.0);
+            self.read(Kind::Dark, None, longest, repeats);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gonio::parts::{Detector, Protocol, Reference};
+
+    #[test]
+    fn pairs_come_in_order_between_visits_and_time_never_runs_back() {
+        let instrument = Instrument {
+            reference: Reference { reflectance: 0.99, ..Reference::default() },
+            detector: Detector { dark_per_s: 3.0, exposures_s: vec![0.1, 1.0], ..Detector::default() },
+            protocol: Protocol { block: 4, repeats: 3 },
+            readings: 2,
+            ..Instrument::default()
+        };
+        let pairs: Vec<u32> = (0..10).collect();
+        let list = series(&instrument, &pairs);
+        let count = |kind| list.iter().filter(|r| r.kind == kind).count();
+        // Three blocks and the end: four visits, the reference in both exposures, the dark in the longer one.
+        assert_eq!(Kind::ALL.map(count), [40, 0, 24, 12]);
+        assert!(list.windows(2).all(|r| r[0].time_s < r[1].time_s));
+        let entries: Vec<u32> = list.iter().filter_map(|r| r.entry).collect();
+        assert!(entries.is_sorted() && entries.last() == Some(&9));
+        assert!(series(&Instrument::noiseless(), &pairs).iter().all(|r| r.kind == Kind::Sample));
+    }
+}
