@@ -305,7 +305,9 @@ fn finish(
     let (sum, known) = uncertainty.stated;
     // Of outliers a stated σ says nothing: a robust fit's noise is told by neighbours.
     let says = known == residuals && known > 0 && problem.saturation.is_none();
-    let stated = says.then(|| (sum / residuals as f64).sqrt());
+    // Shared errors may show in residuals or be taken up by the fit: as much of them counts as noise as there is.
+    let [own, most] = [sum, sum + uncertainty.common_noise].map(|sum| (sum / residuals as f64).sqrt());
+    let stated = says.then(|| rmse.clamp(own, most));
     let independent = residuals as f64 / uncertainty.design_effect;
     let structure = structure::structure(rmse, stated, &uncertainty.neighbours, residuals, independent);
     let structure = structure.filter(|_| rmse > ROUNDING);

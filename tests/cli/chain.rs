@@ -229,6 +229,8 @@ fn raw_readings_reduce_to_the_measurement_and_fit_within_its_errors() {
     assert!(b.text("budget.csv").lines().count() > 500);
     b.ok(&["fit", "again.csv", "--out", "fit.json"]);
     let file = b.json_file("fit.json");
+    let warnings = file["fit"]["warnings"].to_string();
+    assert!(!warnings.contains("does not describe") && !warnings.contains("overstated"), "{warnings}");
     let range = &file["fit"]["interval_95"][0]["weight"][2];
     assert!(number(&range[0]) < 0.30 && number(&range[1]) > 0.30, "{range}");
     // The certificate's 0.3 % is in the error of a weight of 0.3.

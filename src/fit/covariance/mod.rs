@@ -57,6 +57,8 @@ pub(super) struct Uncertainty {
     pub neighbours: Neighbours,
     /// Σ w σ_r² over samples and channels with a stated σ, and how many there are.
     pub stated: (f64, usize),
+    /// Σ w u_r² over samples, channels and shared errors.
+    pub common_noise: f64,
     /// By how many of its standard errors a parameter is off where a fit that follows the data's mean has it, where that matters.
     pub offset: Option<f64>,
     /// Gross outliers under a robust loss.
@@ -131,6 +133,7 @@ pub(super) fn uncertainty(
         bread: sandwich.bread,
         neighbours: totals.neighbours,
         stated: totals.stated,
+        common_noise: totals.common_noise,
         offset,
         outliers,
         by_others,

@@ -36,6 +36,8 @@ pub(super) struct Totals {
     pub outliers: Outliers,
     pub neighbours: Neighbours,
     pub stated: (f64, usize),
+    /// Σ w u_r² of the shared errors.
+    pub common_noise: f64,
 }
 
 impl Totals {
@@ -55,6 +57,7 @@ impl Totals {
             outliers: Outliers::new(parameters),
             neighbours: Neighbours::default(),
             stated: (0.0, 0),
+            common_noise: 0.0,
         }
     }
 
@@ -98,6 +101,7 @@ impl Totals {
         }
         self.outliers.add_channel(&sums.outliers, &strength, &place);
         self.cost += sums.cost;
+        self.common_noise += sums.common_noise;
         self.stated = (self.stated.0 + sums.stated.0, self.stated.1 + sums.stated.1);
         self.neighbours.add(&sums.neighbours);
         self.dark[channel] |= sums.dark;
@@ -121,6 +125,7 @@ struct ChannelSums {
     /// Whether a sample lies where the lobes with a shape are 0 whatever it is.
     dark: bool,
     stated: (f64, usize),
+    common_noise: f64,
     neighbours: Neighbours,
     /// What lines of a table have added to cost, darkness and neighbours, and to the spread.
     on_lines: OnLines,
@@ -151,6 +156,7 @@ impl Piece {
             outliers: Outliers::new(k),
             dark: false,
             stated: (0.0, 0),
+            common_noise: 0.0,
             neighbours: Neighbours::default(),
             on_lines: OnLines::default(),
             tallied: Tallied::new(k),
@@ -282,6 +288,8 @@ impl ChannelSums {
                 let shift = data_slopes[i] * u[block.index[i] as usize];
                 if w[i] > 0.0 && shift.is_finite() { w[i] * trust(i) * scratch.slope[i] * shift } else { 0.0 }
             };
+            let squares = (0..block.len()).map(|i| w[i] * (data_slopes[i] * u[block.index[i] as usize]).powi(2));
+            self.common_noise += squares.filter(|s| s.is_finite()).sum::<f64>();
             let moved: Vec<f64> = (0..block.len()).map(moved).collect();
             project(&scratch.columns, &moved, total);
         }
