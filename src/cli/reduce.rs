@@ -17,8 +17,8 @@ use crate::gonio::{Instrument, Raw, Reduction};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  goniofit simulate --material satin --instrument lab.toml --scan in-plane:5 --raw raw.csv --out satin.csv
-  goniofit reduce raw.csv --out satin.csv --budget budget.csv")]
+  goniofit reduce raw.csv --out satin.csv --budget budget.csv
+  goniofit reduce log.csv --instrument lab.toml --out sample.csv")]
 pub(super) struct Args {
     /// Raw readings: a CSV with kind, time_s, exposure_s, repeat and signals (`-` is stdin)
     raw: PathBuf,
