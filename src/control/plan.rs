@@ -23,10 +23,4 @@ impl Plan {
     pub fn push(&mut self, name: &'static str, on: bool, why: impl Into<String>) {
         self.effects.push(Effect { name, on, why: why.into() });
     }
-
-    /// Whether the effect of this name runs.
-    #[must_use]
-    pub fn is_on(&self, name: &str) -> bool {
-        self.effects.iter().any(|e| e.on && e.name == name)
-    }
 }

@@ -117,8 +117,9 @@ struct Settling {
 impl Settling {
     fn new(problem: &Problem<'_>, like: &Solution, robust: Robust, options: &FitOptions) -> Self {
         let (typical, rounding) = sizes(problem.samples, like);
-        let rounding = rounding.max(typical * spread::rounding_share(problem));
-        let common = spread::common_value(problem);
+        let values = spread::sorted_values(problem);
+        let rounding = rounding.max(typical * spread::rounding_share(&values, problem));
+        let common = spread::common_value(&values);
         Self { robust, steps: options.max_iterations, typical, rounding, common }
     }
 

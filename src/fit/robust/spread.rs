@@ -26,18 +26,17 @@ pub(super) fn telling_spread(samples: &Samples<'_>, at: &Solution, common: Optio
     deviation(&mut pieces.concat()).clamp(rounding, f64::INFINITY)
 }
 
-/// The value that a quarter of the data have or more, if any: what is clipped at 0, or rounded to one step. It agrees with a fit that has it,
+/// The value that a quarter of the (sorted) values have or more, if any: what is clipped at 0, or rounded to one step. It agrees with a fit that has it,
 /// whatever that makes of the others.
-pub(super) fn common_value(problem: &Problem<'_>) -> Option<f64> {
-    let values = sorted_values(problem);
+pub(super) fn common_value(values: &[f64]) -> Option<f64> {
     let longest = values.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
     (4 * longest.len() >= values.len() && longest.len() < values.len()).then(|| longest[0])
 }
 
-/// σ of the rounding of values that are all multiples of one step, over their median size; 0 where they are not. Residuals of such values can't
+/// σ of the rounding of (sorted) values that are all multiples of one step, over their median size; 0 where they are not. Residuals of such values can't
 /// tell a smaller σ, even where a fit meets the most of them: they share few values.
-pub(super) fn rounding_share(problem: &Problem<'_>) -> f64 {
-    let mut values = sorted_values(problem);
+pub(super) fn rounding_share(values: &[f64], problem: &Problem<'_>) -> f64 {
+    let mut values = values.to_vec();
     let largest = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     values.dedup_by(|a, b| (*a - *b).abs() <= 1e-12 * largest);
     let step = values.windows(2).map(|p| p[1] - p[0]).fold(f64::INFINITY, f64::min);
@@ -49,7 +48,7 @@ pub(super) fn rounding_share(problem: &Problem<'_>) -> f64 {
 }
 
 /// Values of a part of the samples, ascending.
-fn sorted_values(problem: &Problem<'_>) -> Vec<f64> {
+pub(super) fn sorted_values(problem: &Problem<'_>) -> Vec<f64> {
     let step = problem.samples.len().div_ceil(ENOUGH).max(1);
     let mut values = values(&problem.samples.listed(|i| i % step == 0));
     values.sort_by(f64::total_cmp);

@@ -57,14 +57,13 @@ impl Block {
             order.par_sort_unstable();
             order
         };
-        let near = |a: u32, b: u32| {
-            let (a, b) = (a as usize, b as usize);
+        let near = |a: usize, b: usize| {
             wi[a].distance_squared(wi[b]) < SAME_INCIDENCE && wo[a].distance_squared(wo[b]) < FARTHEST
         };
         let sorted = |of| {
             let order = by(of);
             let index: Vec<u32> = order.iter().map(|(_, k)| self.index[*k as usize]).collect();
-            let pairs = neighbours(&index, |a, b| near(a as u32, b as u32));
+            let pairs = neighbours(&index, near);
             let count = pairs.iter().filter(|p| **p > 0.0).count();
             (order, index, pairs, count)
         };

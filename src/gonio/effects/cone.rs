@@ -12,7 +12,7 @@ use crate::numeric::quadrature::gauss_legendre;
 const FINEST: usize = 32;
 
 /// The rule of order m: directions about +z of a cone of half angle `alpha`, and their weights, which add up to 1.
-pub(in crate::gonio) fn rule(m: usize, alpha: f64) -> Vec<(DVec3, f64)> {
+fn rule(m: usize, alpha: f64) -> Vec<(DVec3, f64)> {
     if alpha == 0.0 {
         return vec![(DVec3::Z, 1.0)];
     }

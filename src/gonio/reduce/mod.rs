@@ -71,9 +71,6 @@ pub fn reduce(
     if has_reference != instrument.has_reference() {
         return Err(if has_reference { ReduceError::NoCertificate } else { ReduceError::NoScale });
     }
-    if !has_reference && !instrument.is_noisy() && instrument.gain() != 1.0 {
-        return Err(ReduceError::NoScale);
-    }
     let visits = Visits::new(&stops, raw.channels.len(), instrument);
     Ok(Work { raw, instrument, scale: Scale::new(instrument), visits }.run(name, &stops, model))
 }
