@@ -7,3 +7,4 @@ mod coverage;
 mod limits;
 mod raw;
 mod support;
+mod through;
