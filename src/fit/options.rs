@@ -125,6 +125,9 @@ impl FitOptions {
         if sigma.is_some_and(|sigma| !sigma.iter().any(|s| *s > 0.0)) {
             return wrong("use-sigma", "a measurement that states a positive sigma", "sigma 0 throughout".into());
         }
+        if self.through.is_some() && measurement.dimension == Dimension::Flat {
+            return wrong("through", "a measurement in space", "one of the flat world".into());
+        }
         if self.time_budget == Some(Duration::ZERO) {
             return wrong("time-budget", "more than 0", "0".into());
         }
