@@ -41,6 +41,9 @@ pub struct FitRecord {
     /// The robust loss with its SCALE, if any: `cauchy:2.385`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robust: Option<String>,
+    /// The instrument through which the lobes were fitted, if any: what it averages over.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub through: Option<String>,
     /// The robust loss's s, in the residual's unit: one, or one a channel where channels were fitted apart.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub robust_scale: Vec<f64>,

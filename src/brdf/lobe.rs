@@ -52,6 +52,26 @@ pub trait Lobe: Send + Sync + std::fmt::Debug {
     }
 }
 
+/// Lobes as an instrument sees them: averaged over the directions that its source lights and its detector takes in.
+pub trait Sight: Send + Sync + std::fmt::Debug {
+    /// What it averages over, in a few words.
+    fn describe(&self) -> String;
+
+    /// Where a pair of directions stands: two numbers that do not depend on a shape. `None` where what is averaged over reaches below the horizon,
+    /// so that lobes have no value to compare a reading with.
+    fn place(&self, wi: DVec3, wo: DVec3) -> Option<[f64; 2]>;
+
+    /// As [`Lobe::fill`], at such places.
+    fn fill(
+        &self,
+        kind: LobeKind,
+        shape: &[f64],
+        places: &[[f64; 2]],
+        values: &mut [f64],
+        derivatives: &mut [Vec<f64>],
+    );
+}
+
 /// Most shape parameters that a lobe may have.
 pub const MAX_PARAMETERS: usize = 4;
 

@@ -1,6 +1,8 @@
-//! The demo: a built-in glossy material is measured with noise, fitted twice, rendered and compared with the truth.
+//! The demo: a built-in glossy material is measured, fitted, rendered and compared with the truth. By an instrument of one's own the readings are
+//! reduced, and where it has an aperture the fit at face value stands beside the one through it.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::json;
@@ -8,13 +10,14 @@ use serde_json::json;
 use super::error::ChainError;
 use super::gallery::{Shown, write_gallery};
 use super::library::BuiltInMaterial;
-use super::measure::measure;
+use super::measure::{measure, measure_raw, reduced};
 use super::output::write_bytes;
 use super::pictures::{Stage, picture};
 use super::source::{Source, render_material};
-use crate::brdf::Material;
+use crate::brdf::{Material, Sight};
 use crate::control::Control;
 use crate::fit::{FitOptions, fit};
+use crate::gonio::sight::Cones;
 use crate::gonio::{Instrument, Scan};
 use crate::image::Comparison;
 use crate::measurement::{Format, Measurement, formats};
@@ -29,17 +32,21 @@ pub struct DemoOptions {
     pub samples: u32,
     /// Seed of the noise and of the pictures.
     pub seed: u64,
+    /// What measures, and what it is called; a noisy detector alone where there is none.
+    pub instrument: Option<(String, Instrument)>,
 }
 
 impl Default for DemoOptions {
     fn default() -> Self {
-        Self { size: 360, samples: 144, seed: 1 }
+        Self { size: 360, samples: 144, seed: 1, instrument: None }
     }
 }
 
 /// One fit of the demo.
 #[derive(Debug, Clone)]
 pub struct DemoFit {
+    /// Its model, and whether it was fitted through the instrument.
+    pub label: String,
     /// The fitted material with its record.
     pub material: Material,
     /// Its picture against the truth's; none where the work was stopped before it.
@@ -55,6 +62,8 @@ pub struct Demo {
     pub name: &'static str,
     /// Direction pairs measured.
     pub pairs: usize,
+    /// What measured them.
+    pub instrument: String,
     /// The fits, simplest first.
     pub fits: Vec<DemoFit>,
     /// Time of each stage, s.
@@ -66,6 +75,47 @@ pub struct Demo {
 const MATERIAL: &str = "glossy-paint";
 const SCENE: &str = "sphere-on-plane";
 const MODELS: [&str; 2] = ["lambert", "lambert+phong"];
+const NOISY_DETECTOR: &str = "shot and read noise";
+
+/// A fit that is to be made: what it is called, its model, what it sees through.
+struct Wanted {
+    label: String,
+    model: &'static str,
+    through: Option<Arc<dyn Sight>>,
+}
+
+/// The models, and the last of them once more through the instrument where that has an aperture.
+fn wanted(instrument: &Instrument) -> Vec<Wanted> {
+    let plain = MODELS.map(|model| Wanted { label: model.into(), model, through: None });
+    let through = Cones::of(instrument).map(|cones| {
+        let model = MODELS[MODELS.len() - 1];
+        Wanted { label: format!("{model}-through"), model, through: Some(Arc::new(cones)) }
+    });
+    plain.into_iter().chain(through).collect()
+}
+
+/// Measures the demo's material; raw readings and what they are reduced from are written where the instrument has parts.
+fn measured(
+    folder: &Path,
+    source: &Source,
+    options: &DemoOptions,
+    control: Control<'_>,
+) -> Result<Measurement, ChainError> {
+    let scan = Scan::Hemisphere { step_deg: 5.0 };
+    let table = match &options.instrument {
+        Some((_, instrument)) if !instrument.is_plain() => {
+            let raw = measure_raw(MATERIAL, source, instrument, &scan, options.seed, control)?;
+            write_bytes(&folder.join("raw.csv"), raw.to_csv(instrument).as_bytes())?;
+            reduced(MATERIAL, &raw, instrument)?.measurement
+        }
+        other => {
+            let instrument = other.as_ref().map_or_else(Instrument::default, |(_, own)| own.clone());
+            measure(MATERIAL, source, &instrument, &scan, options.seed, control)?
+        }
+    };
+    write_csv(&folder.join("measurement.csv"), &table)?;
+    Ok(table)
+}
 
 /// Runs the chain and writes measurement, fits, pictures and numbers into `folder`.
 ///
@@ -82,24 +132,23 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
         clock = Instant::now();
     };
 
-    let scan = Scan::Hemisphere { step_deg: 5.0 };
-    let source = Source::Fitted(Box::new(truth.clone()));
-    let table = measure(MATERIAL, &source, &Instrument::default(), &scan, options.seed, control)?;
-    lap("measure");
-    write_csv(&folder.join("measurement.csv"), &table)?;
-    lap("write CSV");
+    let table = measured(folder, &Source::Fitted(Box::new(truth.clone())), options, control)?;
+    lap("measure and write");
 
+    let (name, instrument) =
+        options.instrument.clone().unwrap_or_else(|| (NOISY_DETECTOR.into(), Instrument::default()));
     let mut fitted = Vec::new();
-    for model in MODELS {
+    for Wanted { label, model, through } in wanted(&instrument) {
         let spec = model.parse().map_err(|e: crate::brdf::SpecError| ChainError::Mismatch(e.to_string()))?;
-        fitted.push(fit(&table, &FitOptions::new(spec))?.material);
-        write_material(&folder.join(format!("{model}.json")), fitted.last().unwrap_or(&truth))?;
-        lap(&format!("fit {model}"));
+        let material = fit(&table, &FitOptions { through, ..FitOptions::new(spec) })?.material;
+        write_material(&folder.join(format!("{label}.json")), &material)?;
+        lap(&format!("fit {label}"));
+        fitted.push((label, material));
     }
 
     let stage = Stage::built_in(SCENE)?;
     let mut shown = Vec::new();
-    let all = std::iter::once((&truth, "truth")).chain(fitted.iter().zip(MODELS));
+    let all = std::iter::once((&truth, "truth")).chain(fitted.iter().map(|(label, material)| (material, &label[..])));
     for (k, (material, name)) in all.enumerate() {
         if control.stop.requested() {
             break;
@@ -119,17 +168,19 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
     }
     shown.retain(|s| s.image.metadata.samples != Some(0));
     let title = format!("{MATERIAL}, measured and fitted");
-    let subtitle =
-        format!("{} direction pairs with shot and read noise; {SCENE} scene, {}² pixels", table.len(), options.size);
+    let subtitle = format!("{} direction pairs, {name}; {SCENE} scene, {}² pixels", table.len(), options.size);
     let mut comparisons = Vec::new();
     if let Some((reference, others)) = shown.split_first() {
         comparisons = write_gallery(folder, &title, &subtitle, reference, others, None)?.comparisons;
         lap("compare and write");
     }
     let mut images = comparisons.into_iter().map(Some).chain(std::iter::repeat_with(|| None));
-    let fits = fitted.into_iter().map(|material| DemoFit { material, image: images.next().flatten() }).collect();
+    let fits = fitted
+        .into_iter()
+        .map(|(label, material)| DemoFit { label, material, image: images.next().flatten() })
+        .collect();
     let stopped = control.stop.requested();
-    let demo = Demo { truth, name: MATERIAL, pairs: table.len(), fits, times, stopped };
+    let demo = Demo { truth, name: MATERIAL, pairs: table.len(), instrument: name, fits, times, stopped };
     write_numbers(&folder.join("numbers.json"), &demo)?;
     Ok(demo)
 }
@@ -150,10 +201,11 @@ impl Demo {
     #[must_use]
     pub fn numbers(&self) -> serde_json::Value {
         let file = |m: &Material| m.to_json().ok().and_then(|t| serde_json::from_str::<serde_json::Value>(&t).ok());
-        let fit = |f: &DemoFit| json!({ "material": file(&f.material), "image": f.image });
+        let fit = |f: &DemoFit| json!({ "label": f.label, "material": file(&f.material), "image": f.image });
         json!({
             "material": self.name,
             "pairs": self.pairs,
+            "instrument": self.instrument,
             "truth": file(&self.truth),
             "fits": self.fits.iter().map(fit).collect::<Vec<_>>(),
             "seconds": self.times,

@@ -33,7 +33,7 @@ pub fn measure(
 /// Raw readings of a material or table along a scan.
 ///
 /// # Errors
-/// As [`measure`], and for a scan of the flat world.
+/// As [`measure`].
 pub fn measure_raw(
     name: &str,
     source: &Source,
@@ -42,14 +42,11 @@ pub fn measure_raw(
     seed: u64,
     control: Control<'_>,
 ) -> Result<Raw, ChainError> {
-    if scan.dimension() == Dimension::Flat {
-        let reason = "raw readings and instruments with parts belong to space: choose in-plane, hemisphere or merl";
-        return Err(ChainError::Mismatch(format!("{name}: {reason}")));
-    }
     with_truth(name, source, scan, |truth, channels| {
         let (directions, weights) = scan.directions()?;
         let (directions, weights) = (&directions, &weights);
-        let job = Job { truth, channels, instrument, directions, weights, seed, accuracy: ACCURACY, left_out: &[] };
+        let (dimension, accuracy) = (scan.dimension(), ACCURACY);
+        let job = Job { truth, channels, instrument, dimension, directions, weights, seed, accuracy, left_out: &[] };
         Some(job.run(control))
     })
 }

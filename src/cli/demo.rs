@@ -6,17 +6,23 @@ use std::path::PathBuf;
 use super::failure::Failure;
 use super::fit::plus_minus;
 use super::output::make_folder;
+use super::simulate::read_spec;
 use super::ui::{self, Ui};
 use crate::brdf::PerChannel;
 use crate::chain::{Demo, DemoFit, DemoOptions, demo};
 use crate::image::Comparison;
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  goniofit demo --out my-demo")]
+#[command(
+    after_help = "Examples:\n  goniofit demo --out my-demo\n  goniofit demo --instrument lab.toml --out lab-demo"
+)]
 pub(super) struct Args {
     /// Folder to write to
     #[arg(long, default_value = "out/demo", value_name = "DIR")]
     out: PathBuf,
+    /// What measures: a simulation file whose [instrument] counts; without it a noisy detector alone
+    #[arg(long, value_name = "I")]
+    instrument: Option<PathBuf>,
     /// Seed of noise and pictures
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
@@ -30,7 +36,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     make_folder("--out", &args.out)?;
-    let options = DemoOptions { size: args.size, samples: args.samples, seed: args.seed };
+    let instrument = match &args.instrument {
+        Some(path) => Some((path.display().to_string(), read_spec(path)?.instrument)),
+        None => None,
+    };
+    let options = DemoOptions { size: args.size, samples: args.samples, seed: args.seed, instrument };
     let demo = demo(&args.out, &options, ui.control())?;
     if ui::stop().requested() {
         ui.warn("stopped: pictures are missing or have fewer samples than asked for");
@@ -43,12 +53,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 
 fn describe(demo: &Demo) -> String {
     let mut t = format!(
-        "{}: {} direction pairs measured with shot and read noise, then fitted (± is one standard error)\n\n",
-        demo.name, demo.pairs
+        "{}: {} direction pairs measured with {}, then fitted (± is one standard error)\n\n",
+        demo.name, demo.pairs, demo.instrument
     );
     let _ = write!(t, "  {:18} {:>10}", "parameter", "truth");
     for fit in &demo.fits {
-        let _ = write!(t, "  {:>22}", fit.material.model());
+        let _ = write!(t, "  {:>22}", fit.label);
     }
     t.push('\n');
     for (l, lobe) in demo.truth.lobes.iter().enumerate() {

@@ -363,7 +363,7 @@ impl Residuals {
             touch(samples.measurement.plane(*c), line.entries());
         }
         self.line.set(lines, line, cosine);
-        self.scratch.basis(&self.line.x[..self.line.fold.padded()], lobes);
+        self.scratch.bare_basis(&self.line.x[..self.line.fold.padded()], lobes);
     }
 
     /// Residuals of a channel with weights `x`.

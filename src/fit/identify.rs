@@ -49,7 +49,7 @@ fn bounded_noise(problem: &Problem<'_>, at: &Solution) -> Option<f64> {
     let (kind, s) = problem.saturation?;
     let start = || ([0.0; 3], Scratch::default());
     let pieces = problem.samples.map_pieces(start, |(sums, scratch), block| {
-        scratch.basis(&block.x, &at.lobes);
+        scratch.basis(problem.samples, block, &at.lobes);
         for (c, x) in at.weights.iter().enumerate() {
             scratch.residuals(problem.samples, block, c, x, problem.saturation);
             for ((w, r), trust) in block.weight(c).iter().zip(&scratch.r).zip(&scratch.trust) {
@@ -130,7 +130,6 @@ fn too_few_places(problem: &Problem<'_>, channels: usize) -> bool {
 impl Problem<'_> {
     /// Whether a lobe of shape eᵗ is 0 on all samples.
     fn is_invisible(&self, lobe: usize, t: f64) -> bool {
-        let nearest = self.samples.largest_coordinate();
-        self.kinds[lobe].lobe().value(&[t.exp()], nearest, &mut [0.0]) == 0.0
+        self.samples.are_dark(self.kinds[lobe], &[t.exp()])
     }
 }

@@ -164,7 +164,7 @@ impl Joint<'_> {
         parameters: usize,
     ) -> f64 {
         let mut cost = 0.0;
-        scratch.basis(&block.x, &at.lobes);
+        scratch.basis(self.problem.samples, block, &at.lobes);
         for (c, x) in at.weights.iter().enumerate() {
             cost += scratch.residuals(self.problem.samples, block, c, x, self.problem.saturation);
             let (place, strength) = (self.problem.place(at.weights.len(), c), self.problem.strength(&at.weights[c]));

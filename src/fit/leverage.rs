@@ -81,7 +81,7 @@ impl<'a> Leveraged<'a> {
         let zero = Sums::new(problem.kinds.len() + problem.layout.len(), parameters);
         let start = || (vec![zero.clone(); channels], Scratch::default());
         let parts = problem.samples.map_pieces(start, |(sums, scratch), block| {
-            scratch.basis(&block.x, &at.lobes);
+            scratch.basis(problem.samples, block, &at.lobes);
             for (sums, (c, x)) in sums.iter_mut().zip(at.weights.iter().enumerate()) {
                 scratch.residuals(problem.samples, block, c, x, problem.saturation);
                 sums.add(problem, at, block, c, scratch, bread);

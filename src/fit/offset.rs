@@ -34,7 +34,7 @@ pub(super) fn offset(problem: &Problem<'_>, at: &Solution, gross: f64) -> Option
     let parts = samples.map_pieces(
         || (zero.clone(), Scratch::default()),
         |(sums, scratch), block| {
-            scratch.basis(&block.x, &at.lobes);
+            scratch.basis(samples, block, &at.lobes);
             for (c, x) in at.weights.iter().enumerate() {
                 scratch.residuals(samples, block, c, x, problem.saturation);
                 let changes = changes(problem, block, c, scratch, gross);

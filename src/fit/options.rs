@@ -1,10 +1,11 @@
 //! What a fit is asked for, and why it may refuse.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::limits::Limit;
 use super::loss::{Loss, ROBUST_SCALES, Robust};
-use crate::brdf::ModelSpec;
+use crate::brdf::{ModelSpec, Sight};
 use crate::measurement::{Dimension, Measurement};
 
 /// How samples count.
@@ -60,6 +61,9 @@ pub struct FitOptions {
     pub limits: Vec<Limit>,
     /// Fit under the constraint that no channel reflects more than it receives.
     pub conserve_energy: bool,
+    /// The instrument through which the measurement saw the material: lobes are averaged as it averages, so that the material itself is
+    /// fitted. Without one the values are taken for those of the directions they stand at.
+    pub through: Option<Arc<dyn Sight>>,
     /// Time that the fit may take; it then works on as many samples as that allows.
     pub time_budget: Option<Duration>,
     /// Largest share by which the rmse over all samples may exceed the best one's (0.01 for 1 %), with 95 % confidence.
@@ -85,6 +89,7 @@ impl FitOptions {
             per_channel: false,
             limits: Vec::new(),
             conserve_energy: false,
+            through: None,
             time_budget: None,
             target_rmse_excess: None,
             bootstrap: None,
@@ -119,6 +124,9 @@ impl FitOptions {
         let sigma = measurement.sigma.as_ref().filter(|_| self.use_sigma);
         if sigma.is_some_and(|sigma| !sigma.iter().any(|s| *s > 0.0)) {
             return wrong("use-sigma", "a measurement that states a positive sigma", "sigma 0 throughout".into());
+        }
+        if self.through.is_some() && measurement.dimension == Dimension::Flat {
+            return wrong("through", "a measurement in space", "one of the flat world".into());
         }
         if self.time_budget == Some(Duration::ZERO) {
             return wrong("time-budget", "more than 0", "0".into());

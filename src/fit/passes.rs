@@ -52,22 +52,35 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    /// Fills the columns, lists of the coordinates' length.
-    pub fn basis(&mut self, coordinates: &[f64], lobes: &[ShapedLobe]) {
-        let slopes: usize = lobes.iter().map(|l| l.shape.len()).sum();
-        self.columns.resize_with(lobes.len() + slopes, Vec::new);
-        self.columns.iter_mut().for_each(|c| c.resize(coordinates.len(), 0.0));
-        let (values, derivatives) = self.columns.split_at_mut(lobes.len());
-        let mut next = 0;
-        for (lobe, phi) in lobes.iter().zip(values) {
-            let own = &mut derivatives[next..next + lobe.shape.len()];
-            next += lobe.shape.len();
+    /// Fills the columns with the lobes as they are at these coordinates.
+    pub fn bare_basis(&mut self, coordinates: &[f64], lobes: &[ShapedLobe]) {
+        self.fill(coordinates.len(), lobes, |lobe, phi, own| {
             if own.is_empty() {
                 // A lobe without a shape is the same wherever both directions are above the horizon, as all samples' are.
                 phi.fill(lobe.kind.lobe().value(&[], 0.0, &mut []));
             } else {
                 lobe.kind.lobe().fill(&lobe.shape, coordinates, phi, own);
             }
+        });
+    }
+
+    /// Fills the columns with the lobes as the samples of a block see them.
+    pub fn basis(&mut self, samples: &Samples<'_>, block: &Block, lobes: &[ShapedLobe]) {
+        let Some(sight) = &samples.sight else { return self.bare_basis(&block.x, lobes) };
+        self.fill(block.len(), lobes, |lobe, phi, own| sight.fill(lobe.kind, &lobe.shape, &block.places, phi, own));
+    }
+
+    /// Fills the columns, lists of this length: values of each lobe and their derivatives by `of`.
+    fn fill(&mut self, length: usize, lobes: &[ShapedLobe], of: impl Fn(&ShapedLobe, &mut [f64], &mut [Vec<f64>])) {
+        let slopes: usize = lobes.iter().map(|l| l.shape.len()).sum();
+        self.columns.resize_with(lobes.len() + slopes, Vec::new);
+        self.columns.iter_mut().for_each(|c| c.resize(length, 0.0));
+        let (values, derivatives) = self.columns.split_at_mut(lobes.len());
+        let mut next = 0;
+        for (lobe, phi) in lobes.iter().zip(values) {
+            let own = &mut derivatives[next..next + lobe.shape.len()];
+            next += lobe.shape.len();
+            of(lobe, phi, own);
             for (list, s) in own.iter_mut().zip(&lobe.shape) {
                 vectorised(Scale(list, *s));
             }
@@ -302,7 +315,7 @@ pub(super) fn sums(
     let lines = folds.then(|| line_sums(samples, lobes, weights, &zero)).flatten();
     let parts: Vec<Vec<Sums>> = lines.unwrap_or_else(|| {
         let on_block = |(sums, scratch): &mut (Vec<Sums>, Scratch), block: &Block| {
-            scratch.basis(&block.x, lobes);
+            scratch.basis(samples, block, lobes);
             for (sums, (c, x)) in sums.iter_mut().zip(weights.iter().enumerate()) {
                 sums.cost += scratch.residuals(samples, block, c, x, saturation);
                 if matrix > 0 {

@@ -114,10 +114,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Whether every lobe is a constant or a power, so that the transforms know all sums.
+    /// Whether every lobe is a constant or a power, seen as it is, so that the transforms know all sums.
     pub fn is_transformable(&self) -> bool {
         let known = |k: &LobeKind| k.lobe().parameters().is_empty() || k.lobe().power(1.0).is_some();
-        self.samples.loss.is_linear() && self.saturation.is_none() && self.kinds.iter().all(known)
+        let plain = self.samples.loss.is_linear() && self.saturation.is_none() && self.samples.sight.is_none();
+        plain && self.kinds.iter().all(known)
     }
 
     pub fn shaped(&self, t: &[f64]) -> Vec<ShapedLobe> {

@@ -4,6 +4,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::instrument::Instrument;
 use super::reading::Reading;
+use crate::measurement::Dimension;
 use crate::numeric::random::{Purpose, Stream, stream};
 
 /// Errors of one instrument, the same in all its readings, and the walks of what drifts.
@@ -48,6 +49,15 @@ impl Actual {
             power: walk(instrument.source.drift_per_sqrt_hour, readings, stream(seed, Purpose::Instrument, POWER)),
             dark: walk(instrument.detector.dark_drift_per_sqrt_hour, readings, stream(seed, Purpose::Instrument, DARK)),
         }
+    }
+
+    /// The same errors as far as they leave directions in the world that is measured: of the flat one its plane.
+    #[must_use]
+    pub fn within(mut self, dimension: Dimension) -> Self {
+        if dimension == Dimension::Flat {
+            (self.zeros[1], self.zeros[3], self.tilt[1]) = (0.0, 0.0, 0.0);
+        }
+        self
     }
 
     /// The instrument as described, without any error.

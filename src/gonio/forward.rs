@@ -12,7 +12,7 @@ use super::reading::{Kind, Reading};
 use super::series::series;
 use super::simulate::Truth;
 use crate::control::Control;
-use crate::measurement::{Directions, Weights};
+use crate::measurement::{Dimension, Directions, Weights};
 use crate::numeric::sum::BLOCK;
 
 /// What is to be read, and how.
@@ -23,6 +23,8 @@ pub struct Job<'a> {
     pub channels: &'a [String],
     /// The instrument.
     pub instrument: &'a Instrument,
+    /// Flat world or space; in the flat world directions lie in the xz plane, and so do all errors of theirs.
+    pub dimension: Dimension,
     /// Pairs of directions to measure.
     pub directions: &'a Directions,
     /// What each of them stands for.
@@ -48,15 +50,15 @@ impl Job<'_> {
         };
         let entries: Vec<u32> = (0..self.directions.len() as u32).filter(is_lit).collect();
         let readings = series(self.instrument, &entries);
-        let actual = Actual::draw(self.instrument, &readings, self.seed);
+        let actual = Actual::draw(self.instrument, &readings, self.seed).within(self.dimension);
         self.read(readings, &actual, control)
     }
 
     /// Reads everything by an instrument with the errors `actual`.
     #[must_use]
     pub fn read(&self, readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
-        let Self { truth, instrument, seed, accuracy, .. } = *self;
-        let passes = effects::passes(&Maker { instrument, actual, truth, seed, accuracy }, self.left_out);
+        let Self { truth, instrument, seed, accuracy, dimension, .. } = *self;
+        let passes = effects::passes(&Maker { instrument, dimension, actual, truth, seed, accuracy }, self.left_out);
         let (n, width) = (readings.len(), self.channels.len());
         control.progress.start("reading", n as u64);
         let blocks: Vec<(Vec<f64>, f64)> = (0..n.div_ceil(BLOCK))
@@ -79,6 +81,7 @@ impl Job<'_> {
         blocks.into_iter().for_each(|(part, _)| signal.extend(part));
         Raw {
             channels: self.channels.to_vec(),
+            dimension,
             directions: self.directions.clone(),
             weights: self.weights.clone(),
             readings,

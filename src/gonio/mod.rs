@@ -16,6 +16,7 @@ mod reading;
 mod reduce;
 mod scan;
 mod series;
+pub mod sight;
 mod simulate;
 mod spec;
 

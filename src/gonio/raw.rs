@@ -1,13 +1,15 @@
 //! Raw readings: what the instrument wrote down, before anything is made of it.
 
 use super::reading::Reading;
-use crate::measurement::{Directions, Weights};
+use crate::measurement::{Dimension, Directions, Weights};
 
 /// Readings in order of time, all channels each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raw {
     /// Names of the channels.
     pub channels: Vec<String>,
+    /// Flat world or space.
+    pub dimension: Dimension,
     /// The pairs of directions that readings of the sample belong to.
     pub directions: Directions,
     /// What each of them stands for.

@@ -1,6 +1,6 @@
 //! Raw readings as a CSV file: the four angles, `kind`, `time_s`, `exposure_s`, `repeat`, and one `signal_<channel>` each.
 //!
-//! Columns stand in any order. Rows are in order of time; angles may be empty in a row that is no `sample`, a signal where nothing was read. Rows of one
+//! In the flat world (`# dimension: 2`) the angles are `theta_i_deg` and `theta_o_deg`, −90 to 90. Columns stand in any order. Rows are in order of time; angles may be empty in a row that is no `sample`, a signal where nothing was read. Rows of one
 //! kind and pair of directions in a row are one stop of the axes. `# instrument: {…}`, JSON on one line, describes what made them, and `weight`,
 //! a column that simulated files have, holds what a pair of directions stands for (`# weights: solid-angle`: the grid's solid angle).
 
@@ -14,17 +14,25 @@ use super::instrument::Instrument;
 use super::raw::Raw;
 use super::reading::{Kind, Reading};
 use crate::geometry::angles::direction_deg;
-use crate::measurement::formats::{is_reserved, push_number, spherical_deg};
-use crate::measurement::{Directions, MeasurementError, Weights};
+use crate::measurement::formats::{flat_deg, is_reserved, push_number, spherical_deg};
+use crate::measurement::{Dimension, Directions, MeasurementError, Weights};
 
 const ANGLES: [&str; 4] = ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"];
+const FLAT_ANGLES: [&str; 2] = ["theta_i_deg", "theta_o_deg"];
 const PLACES: [&str; 4] = ["kind", "time_s", "exposure_s", "repeat"];
 const SIGNAL: &str = "signal_";
 const WEIGHT: &str = "weight";
 const INSTRUMENT: &str = "# instrument:";
+const DIMENSION: &str = "# dimension:";
 const SOLID_ANGLE: &str = "# weights: solid-angle";
 /// Largest magnitudes of the four angles, with room for rounding.
 const LARGEST: [f64; 4] = [180.0001, 360.0001, 180.0001, 360.0001];
+const FLAT_LARGEST: [f64; 2] = [90.0001, 90.0001];
+
+/// Names of the angles in a world.
+fn angle_names(dimension: Dimension) -> &'static [&'static str] {
+    if dimension == Dimension::Flat { &FLAT_ANGLES } else { &ANGLES }
+}
 
 impl Raw {
     /// The text of a file.
@@ -36,7 +44,10 @@ impl Raw {
         if matches!(self.weights, Weights::SolidAngle(_) | Weights::Merl) {
             let _ = writeln!(text, "{SOLID_ANGLE}");
         }
-        let names = ANGLES.iter().chain(&PLACES).map(ToString::to_string);
+        if self.dimension == Dimension::Flat {
+            let _ = writeln!(text, "{DIMENSION} 2");
+        }
+        let names = angle_names(self.dimension).iter().chain(&PLACES).map(ToString::to_string);
         let signals = self.channels.iter().map(|c| format!("{SIGNAL}{c}"));
         let weight = self.weights.known().then(|| WEIGHT.to_string());
         let header: Vec<String> = names.chain(signals).chain(weight).collect();
@@ -50,10 +61,13 @@ impl Raw {
 
     fn push_row(&self, i: usize, reading: &Reading, text: &mut String) {
         match reading.entry.map(|e| self.directions.pair(e as usize)) {
+            Some((wi, wo)) if self.dimension == Dimension::Flat => {
+                [wi, wo].into_iter().for_each(|w| push_number(text, flat_deg(w)));
+            }
             Some((wi, wo)) => {
                 [spherical_deg(wi), spherical_deg(wo)].into_iter().flatten().for_each(|a| push_number(text, a));
             }
-            None => text.push_str(",,,,"),
+            None => (0..angle_names(self.dimension).len()).for_each(|_| text.push(',')),
         }
         text.push_str(reading.kind.name());
         text.push(',');
@@ -72,14 +86,14 @@ impl Raw {
     /// [`MeasurementError`] naming line, column, what was expected and found.
     pub fn from_csv(path: &Path, text: &str) -> Result<(Self, Option<Instrument>), MeasurementError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let instrument = described(path, text)?;
+        let (instrument, dimension) = (described(path, text)?, dimension_of(path, text)?);
         let mut reader = ::csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(::csv::Trim::All)
             .has_headers(true)
             .from_reader(text.as_bytes());
         let header = reader.headers().map_err(|e| malformed(path, &e))?.clone();
-        let columns = Columns::new(path, &header)?;
+        let columns = Columns::new(path, &header, dimension)?;
         let mut rows = Rows { path, columns: &columns, list: List::default() };
         for record in reader.records() {
             let record = record.map_err(|e| malformed(path, &e))?;
@@ -87,6 +101,19 @@ impl Raw {
         }
         let is_grid = text.lines().take_while(|l| l.starts_with('#')).any(|l| l.trim_end() == SOLID_ANGLE);
         rows.list.finish(path, &columns, is_grid).map(|raw| (raw, instrument))
+    }
+}
+
+/// The world that a comment says, space by default.
+fn dimension_of(path: &Path, text: &str) -> Result<Dimension, MeasurementError> {
+    let comments = text.lines().enumerate().take_while(|(_, l)| l.starts_with('#'));
+    let mut found = comments.filter_map(|(i, l)| l.strip_prefix(DIMENSION).map(|value| (i + 1, value.trim())));
+    match found.next() {
+        None | Some((_, "3")) => Ok(Dimension::Space),
+        Some((_, "2")) => Ok(Dimension::Flat),
+        Some((line, other)) => {
+            Err(MeasurementError::invalid(path, format!("line {line}, `{DIMENSION}`"), "2 or 3", format!("{other:?}")))
+        }
     }
 }
 
@@ -128,7 +155,8 @@ fn malformed(path: &Path, error: &::csv::Error) -> MeasurementError {
 
 /// Where the columns stand.
 struct Columns {
-    angles: [usize; 4],
+    dimension: Dimension,
+    angles: Vec<usize>,
     /// kind, `time_s`, `exposure_s`, repeat.
     places: [usize; 4],
     channels: Vec<(String, usize)>,
@@ -136,7 +164,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn new(path: &Path, header: &::csv::StringRecord) -> Result<Self, MeasurementError> {
+    fn new(path: &Path, header: &::csv::StringRecord, dimension: Dimension) -> Result<Self, MeasurementError> {
         let wrong = |expected: String, found: String| MeasurementError::invalid(path, "the header", expected, found);
         let mut seen = HashMap::new();
         for (column, name) in header.iter().enumerate() {
@@ -149,10 +177,10 @@ impl Columns {
                 .copied()
                 .ok_or_else(|| wrong(format!("a column `{name}`"), format!("{:?}", header.iter().collect::<Vec<_>>())))
         };
-        let all = |names: [&str; 4]| -> Result<[usize; 4], MeasurementError> {
-            Ok([find(names[0])?, find(names[1])?, find(names[2])?, find(names[3])?])
-        };
-        let (angles, places) = (all(ANGLES)?, all(PLACES)?);
+        let names = angle_names(dimension);
+        let angles = names.iter().map(|name| find(name)).collect::<Result<Vec<_>, _>>()?;
+        let [kind, time, exposure, repeat] = PLACES;
+        let places = [find(kind)?, find(time)?, find(exposure)?, find(repeat)?];
         let mut channels = Vec::new();
         for (column, name) in header.iter().enumerate() {
             match name.strip_prefix(SIGNAL) {
@@ -160,7 +188,7 @@ impl Columns {
                     return Err(wrong("a channel's name".into(), format!("`{name}`")));
                 }
                 Some(channel) => channels.push((channel.to_owned(), column)),
-                None if name == WEIGHT || ANGLES.contains(&name) || PLACES.contains(&name) => {}
+                None if name == WEIGHT || names.contains(&name) || PLACES.contains(&name) => {}
                 None => {
                     return Err(wrong(format!("angles, {} or `{SIGNAL}…`", PLACES.join(", ")), format!("`{name}`")));
                 }
@@ -169,7 +197,7 @@ impl Columns {
         if channels.is_empty() {
             return Err(wrong(format!("a column `{SIGNAL}…`"), "none".into()));
         }
-        Ok(Self { angles, places, channels, weight: seen.get(WEIGHT).copied() })
+        Ok(Self { dimension, angles, places, channels, weight: seen.get(WEIGHT).copied() })
     }
 }
 
@@ -196,6 +224,7 @@ impl List {
         };
         Ok(Raw {
             channels: columns.channels.iter().map(|(name, _)| name.clone()).collect(),
+            dimension: columns.dimension,
             directions: Directions::List { wi: self.wi, wo: self.wo },
             weights,
             readings: self.readings,
@@ -253,12 +282,16 @@ impl Rows<'_> {
         record: &::csv::StringRecord,
         wrong: &impl Fn(&str, &str, &str) -> MeasurementError,
     ) -> Result<u32, MeasurementError> {
-        let mut angles = [0.0; 4];
-        for (k, (angle, column)) in angles.iter_mut().zip(self.columns.angles).enumerate() {
-            let text = record.get(column).unwrap_or_default();
-            let parsed = text.parse::<f64>().ok().filter(|a| a.abs() <= LARGEST[k]);
-            *angle = parsed.ok_or_else(|| wrong(ANGLES[k], "an angle in degrees", text))?;
+        let is_flat = self.columns.dimension == Dimension::Flat;
+        let (names, largest) =
+            (angle_names(self.columns.dimension), if is_flat { &FLAT_LARGEST[..] } else { &LARGEST });
+        let mut typed = [0.0; 4];
+        for (k, (angle, column)) in typed.iter_mut().zip(&self.columns.angles).enumerate() {
+            let text = record.get(*column).unwrap_or_default();
+            let parsed = text.parse::<f64>().ok().filter(|a| a.abs() <= largest[k]);
+            *angle = parsed.ok_or_else(|| wrong(names[k], "an angle in degrees", text))?;
         }
+        let angles = if is_flat { [typed[0], 0.0, typed[1], 0.0] } else { typed };
         // −0 is 0.
         let key = angles.map(|a| (a + 0.0).to_bits());
         if let Some(entry) = self.list.entries.get(&key) {

@@ -4,6 +4,8 @@
 #![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
 mod coverage;
+mod flat;
 mod limits;
 mod raw;
 mod support;
+mod through;

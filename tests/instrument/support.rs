@@ -5,7 +5,7 @@ use goniofit::brdf::{LobeKind, Material};
 use goniofit::control::Control;
 use goniofit::gonio::parts::{Axes, Detector, Holder, Protocol, Reference, Source, Surroundings};
 use goniofit::gonio::{Actual, Instrument, Job, Raw, Reduction, Scan, reduce, series};
-use goniofit::measurement::{Directions, Weights};
+use goniofit::measurement::{Dimension, Directions, Weights};
 
 /// One channel, one lobe of each kind.
 pub fn material(kd: f64, ks: f64, n: f64) -> Material {
@@ -76,8 +76,9 @@ pub fn with_job<T>(
         true
     };
     let (directions, weights) = (&scan.0, &scan.1);
-    let accuracy = 1e-9;
-    work(&Job { truth: &truth, channels: &of.channels, instrument, directions, weights, seed, accuracy, left_out })
+    let (accuracy, channels) = (1e-9, &of.channels);
+    let dimension = if of.is_flat() { Dimension::Flat } else { Dimension::Space };
+    work(&Job { truth: &truth, channels, instrument, dimension, directions, weights, seed, accuracy, left_out })
 }
 
 /// Reduced, errors of positions by the slopes of `model`.

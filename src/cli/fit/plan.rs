@@ -1,12 +1,15 @@
 //! From what was typed to a plan: the options of the fit, and where each result goes.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::args::{Args, Wanted};
-use crate::brdf::SpecError;
+use crate::brdf::{Sight, SpecError};
 use crate::cli::failure::Failure;
 use crate::cli::output::keeps_inputs;
+use crate::cli::simulate::read_spec;
 use crate::fit::{Bootstrap, FitOptions, Limit};
+use crate::gonio::sight::Cones;
 
 impl Args {
     /// The fit's options.
@@ -32,11 +35,26 @@ impl Args {
             per_channel: self.per_channel,
             limits,
             conserve_energy: self.conserve_energy,
+            through: self.sight()?,
             time_budget: self.time_budget,
             target_rmse_excess: self.target_rmse_excess,
             bootstrap: self.bootstrap.map(|replicates| Bootstrap { replicates, seed: self.seed }),
             ..FitOptions::new(model)
         })
+    }
+
+    /// What lobes are seen through.
+    fn sight(&self) -> Result<Option<Arc<dyn Sight>>, Failure> {
+        let Some(path) = &self.through else { return Ok(None) };
+        let instrument = read_spec(path)?.instrument;
+        match Cones::of(&instrument) {
+            Some(cones) => Ok(Some(Arc::new(cones))),
+            None => Err(Failure::usage(format!(
+                "--through {}: expected an instrument with an aperture (instrument.detector.aperture_deg) or a divergence \
+                 (instrument.source.divergence_deg), found points, through which a fit is the plain one",
+                path.display()
+            ))),
+        }
     }
 
     /// The option that limit `i` of all was typed with.

@@ -113,6 +113,9 @@ fn evidence(record: &FitRecord, material: &Material) -> String {
     let mut t = String::new();
     let unit = unit_of(record, material);
     let mut say = |text: String| t.push_str(&hanging(&text));
+    if let Some(through) = &record.through {
+        say(format!("fitted through {through}: the material, not its readings"));
+    }
     if let (Some(robust), [first, ..]) = (&record.robust, &record.robust_scale[..]) {
         let others = if record.robust_scale.len() > 1 { " (the first channel's)" } else { "" };
         say(format!("robust {robust}: residuals beyond {}{unit}{others} count less", small(*first, 3)));

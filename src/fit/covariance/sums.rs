@@ -168,7 +168,7 @@ impl Piece {
     /// Adds all sums over one block; `bread` says whether A is among them, `gross` from which residual one is an outlier.
     fn add(&mut self, problem: &Problem<'_>, at: &Solution, block: &Block, bread: bool, gross: f64) {
         let channels = at.weights.len();
-        self.residuals.scratch.basis(&block.x, &at.lobes);
+        self.residuals.scratch.basis(problem.samples, block, &at.lobes);
         let clusters: Vec<std::ops::Range<usize>> = problem.samples.clusters(block);
         let mut scores = vec![DVector::<f64>::zeros(self.clusters.nrows()); clusters.len()];
         for (c, x) in at.weights.iter().enumerate() {

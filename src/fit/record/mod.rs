@@ -97,6 +97,7 @@ impl Facts<'_> {
             status: self.status().into(),
             loss: self.options.loss.name().into(),
             weights: self.parts[0].weighting.into(),
+            through: self.options.through.as_ref().map(|sight| sight.describe()),
             robust: self.options.robust.map(|r| r.to_string()),
             robust_scale: self.parts.iter().filter_map(|p| p.saturation.map(|(_, s)| s * unit(p).sqrt())).collect(),
             relative_epsilon: if relative { self.parts.iter().flat_map(epsilon).collect() } else { Vec::new() },

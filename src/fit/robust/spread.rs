@@ -118,7 +118,7 @@ fn of_residuals<T: Clone + Send + Sync>(
 ) -> Vec<T> {
     let start = || (empty.clone(), Scratch::default());
     let pieces = samples.map_pieces(start, |(sum, scratch), block| {
-        scratch.basis(&block.x, &at.lobes);
+        scratch.basis(samples, block, &at.lobes);
         for (c, x) in at.weights.iter().enumerate() {
             scratch.residuals(samples, block, c, x, None);
             let (w, y) = (block.weight(c), &block.y[c]);

@@ -15,6 +15,8 @@ pub(in crate::fit) struct Block {
     pub cos_i: Vec<f64>,
     /// Coordinate of the lobes that have a shape.
     pub x: Vec<f64>,
+    /// Where each sample stands for an instrument that lobes are seen through; left out without one.
+    pub places: Vec<[f64; 2]>,
     /// 1 where a sample is a neighbour of the one before, else 0.
     pub pairs: Vec<f64>,
     /// Normalised weight w, one list for all channels or one a channel; 0 where masked.
@@ -28,6 +30,7 @@ impl Block {
         self.index.clear();
         self.cos_i.clear();
         self.x.clear();
+        self.places.clear();
         self.pairs.clear();
         self.w.resize_with(lists, Vec::new);
         self.y.resize_with(channels, Vec::new);
@@ -72,12 +75,14 @@ impl Block {
         let is_good = rings.3 * 10 >= self.len() * 9;
         let meridians = if is_good { None } else { Some(sorted(on_meridian)) };
         let (order, index, pairs, _) = meridians.filter(|m| m.3 > rings.3).unwrap_or(rings);
+        let places = order.iter().filter_map(|(_, k)| self.places.get(*k as usize).copied()).collect();
         let pick = |list: &Vec<f64>| order.iter().map(|(_, k)| list[*k as usize]).collect();
         Self {
             pairs,
             index,
             cos_i: pick(&self.cos_i),
             x: pick(&self.x),
+            places,
             w: self.w.iter().map(pick).collect(),
             y: self.y.iter().map(pick).collect(),
         }
@@ -93,6 +98,7 @@ impl Block {
         self.index.extend_from_slice(&other.index);
         self.cos_i.extend_from_slice(&other.cos_i);
         self.x.extend_from_slice(&other.x);
+        self.places.extend_from_slice(&other.places);
         self.pairs.extend_from_slice(&other.pairs);
         let pairs = self.w.iter_mut().chain(&mut self.y).zip(other.w.iter().chain(&other.y));
         pairs.for_each(|(list, more)| list.extend_from_slice(more));

@@ -45,6 +45,7 @@ impl<'a> Samples<'a> {
             measurement,
             channels: channels.to_vec(),
             source: Source::Listed(Block::default()),
+            sight: options.through.clone(),
             loss: options.loss,
             count: 0,
             lists: channels.len(),
@@ -122,6 +123,7 @@ impl<'a> Samples<'a> {
         let own = !solid_angle || matches!(self.measurement.weights, crate::measurement::Weights::Merl);
         let plain =
             options.loss.is_linear() && options.robust.is_none() && !options.use_sigma && options.stride == 1 && own;
+        let plain = plain && options.through.is_none();
         plain.then(|| MerlLines::new(grid, least_cos(options), solid_angle))
     }
 

@@ -7,6 +7,7 @@ mod gather;
 mod select;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -19,6 +20,7 @@ use super::loss::Loss;
 use super::merl_lines::{self, Line, MerlLines};
 use super::part::SMALL;
 use super::transform::Transform;
+use crate::brdf::{LobeKind, Sight};
 use crate::measurement::{Directions, Measurement};
 use crate::numeric::simd::vectorised;
 use crate::numeric::sum::BLOCK;
@@ -40,6 +42,8 @@ pub(in crate::fit) struct Samples<'a> {
     /// The measurement's channels that are fitted.
     pub channels: Vec<usize>,
     source: Source,
+    /// What lobes are seen through.
+    pub sight: Option<Arc<dyn Sight>>,
     /// The loss they were prepared for.
     pub loss: Loss,
     /// Directions that count.
@@ -166,6 +170,7 @@ impl Samples<'_> {
                 block.index.extend_from_slice(&all.index[range.clone()]);
                 block.cos_i.extend_from_slice(&all.cos_i[range.clone()]);
                 block.x.extend_from_slice(&all.x[range.clone()]);
+                block.places.extend_from_slice(all.places.get(range.clone()).unwrap_or_default());
                 block.pairs.extend_from_slice(&all.pairs[range.clone()]);
                 let pairs = block.w.iter_mut().chain(&mut block.y).zip(all.w.iter().chain(&all.y));
                 pairs.for_each(|(to, from)| to.extend_from_slice(&from[range.clone()]));
@@ -214,6 +219,7 @@ impl Samples<'_> {
                     all.index.extend(block.index.get(i));
                     all.cos_i.push(block.cos_i[i]);
                     all.x.push(block.x[i]);
+                    all.places.extend(block.places.get(i));
                     all.pairs.push(block.pairs[i]);
                     let pairs = all.w.iter_mut().chain(&mut all.y).zip(block.w.iter().chain(&block.y));
                     pairs.for_each(|(to, from)| to.push(from[i]));
@@ -225,11 +231,25 @@ impl Samples<'_> {
     }
 
     /// Largest coordinate of all samples; 0, the peak, stands for a table's.
-    pub fn largest_coordinate(&self) -> f64 {
+    fn largest_coordinate(&self) -> f64 {
         match &self.source {
             Source::Listed(all) => all.x.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             Source::Merl(_) => 0.0,
         }
+    }
+
+    /// Whether a lobe of one shape parameter is 0 on all samples.
+    pub fn are_dark(&self, kind: LobeKind, shape: &[f64]) -> bool {
+        let nearest = match (&self.source, &self.sight) {
+            (Source::Listed(all), Some(_)) => all.places.iter().min_by(|a, b| a[0].total_cmp(&b[0])),
+            _ => None,
+        };
+        let mut value = [0.0];
+        match (nearest, &self.sight) {
+            (Some(place), Some(sight)) => sight.fill(kind, shape, &[*place], &mut value, &mut [vec![0.0]]),
+            _ => value[0] = kind.lobe().value(shape, self.largest_coordinate(), &mut [0.0]),
+        }
+        value[0] == 0.0
     }
 
     /// How many distinct coordinates the samples stand at, counted up to `most`.
@@ -273,6 +293,7 @@ impl Samples<'_> {
         Self {
             measurement: self.measurement,
             channels: self.channels.clone(),
+            sight: self.sight.clone(),
             loss: self.loss,
             count: all.len(),
             lists: self.lists,

@@ -104,9 +104,10 @@ impl Judge<'_> {
         for entry in self.thin.entries(range).filter(counts) {
             left.entries += 1;
             let (wi, wo) = self.samples.measurement.directions.pair(entry);
+            let place = self.samples.sight.as_ref().map(|sight| sight.place(wi, wo));
             if !(wi.z > 0.0 && wo.z > 0.0) {
                 left.below += 1;
-            } else if wi.z < self.least_cos || wo.z < self.least_cos {
+            } else if wi.z < self.least_cos || wo.z < self.least_cos || place == Some(None) {
                 left.beyond += 1;
             } else if !self.values(entry, wi.z, &mut w, &mut y, &mut left) {
                 left.masked += 1;
@@ -116,6 +117,7 @@ impl Judge<'_> {
                 block.index.push(entry as u32);
                 block.cos_i.push(wi.z);
                 block.x.push(self.kind.map_or(0.0, |k| k.lobe().coordinate(wi, wo)));
+                block.places.extend(place.flatten());
                 block.pairs.push(0.0);
                 block.w.iter_mut().zip(&w).for_each(|(list, w)| list.push(*w));
                 block.y.iter_mut().zip(&y).for_each(|(list, y)| list.push(*y));

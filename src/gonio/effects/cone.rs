@@ -6,6 +6,7 @@
 use glam::DVec3;
 
 use crate::geometry::frame::Frame;
+use crate::measurement::Dimension;
 use crate::numeric::quadrature::gauss_legendre;
 
 /// Largest m.
@@ -32,18 +33,40 @@ fn rule(m: usize, alpha: f64) -> Vec<(DVec3, f64)> {
     list
 }
 
+/// As [`rule`], in the flat world: directions of the xz plane, even in angle.
+fn flat_rule(m: usize, alpha: f64) -> Vec<(DVec3, f64)> {
+    if alpha == 0.0 {
+        return vec![(DVec3::Z, 1.0)];
+    }
+    let at = |&(x, w): &(f64, f64)| {
+        let (sin, cos) = (alpha * x).sin_cos();
+        (DVec3::new(sin, 0.0, cos), 0.5 * w)
+    };
+    gauss_legendre(2 * m).iter().map(at).collect()
+}
+
+/// A frame about `w`; in the flat world its first tangent lies in the xz plane.
+fn frame_about(w: DVec3, dimension: Dimension) -> Frame {
+    match dimension {
+        Dimension::Space => Frame::from_normal(w),
+        Dimension::Flat => Frame { tangent: DVec3::new(w.z, 0.0, -w.x), bitangent: DVec3::Y, normal: w },
+    }
+}
+
 /// Rules of both cones by order.
 pub(in crate::gonio) struct Cones {
     /// For m = 1, 2, 4, …: the source's and the detector's.
     rules: Vec<[Vec<(DVec3, f64)>; 2]>,
     accuracy: f64,
+    dimension: Dimension,
 }
 
 impl Cones {
     /// Rules for half angles `source` and `detector` (rad), for means as good as `accuracy` (relative).
-    pub fn new(source: f64, detector: f64, accuracy: f64) -> Self {
+    pub fn new(source: f64, detector: f64, accuracy: f64, dimension: Dimension) -> Self {
+        let rule = if dimension == Dimension::Flat { flat_rule } else { rule };
         let orders = std::iter::successors(Some(1), |m| (2 * m <= FINEST).then_some(2 * m));
-        Self { rules: orders.map(|m| [rule(m, source), rule(m, detector)]).collect(), accuracy }
+        Self { rules: orders.map(|m| [rule(m, source), rule(m, detector)]).collect(), accuracy, dimension }
     }
 
     /// Writes the mean of `f`, all channels, over both cones about (wi, wo), and returns the largest relative change that the last doubling
@@ -55,7 +78,7 @@ impl Cones {
         f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
         out: &mut [f64],
     ) -> f64 {
-        let (about_i, about_o) = (Frame::from_normal(wi), Frame::from_normal(wo));
+        let (about_i, about_o) = (frame_about(wi, self.dimension), frame_about(wo, self.dimension));
         let mut before = vec![0.0; out.len()];
         let mut change = f64::INFINITY;
         for (level, [source, detector]) in self.rules.iter().enumerate() {

@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use super::{Block, Entry, Maker, Pass};
 use crate::gonio::instrument::Instrument;
+use crate::measurement::Dimension;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "footprint",
@@ -20,7 +21,7 @@ pub(super) const EFFECT: Entry = Entry {
         }
         what => Ok(format!("a beam of {} m on {what}", i.source.beam_diameter_m)),
     },
-    make: |maker: &Maker<'_>| Footprint::of(maker.instrument).map(|f| Box::new(f) as Box<dyn Pass>),
+    make: |maker: &Maker<'_>| Footprint::of(maker.instrument, maker.dimension).map(|f| Box::new(f) as Box<dyn Pass>),
 };
 
 fn cut_by(instrument: &Instrument) -> &'static str {
@@ -40,16 +41,18 @@ pub(in crate::gonio) struct Footprint {
     beam: f64,
     sample: f64,
     field: f64,
+    dimension: Dimension,
 }
 
 impl Footprint {
     /// The instrument's; `None` where nothing cuts its beam.
-    pub fn of(instrument: &Instrument) -> Option<Self> {
+    pub fn of(instrument: &Instrument, dimension: Dimension) -> Option<Self> {
         let radius = |diameter: f64| if diameter > 0.0 { 0.5 * diameter } else { f64::INFINITY };
         (!cut_by(instrument).is_empty()).then(|| Self {
             beam: 0.5 * instrument.source.beam_diameter_m,
             sample: radius(instrument.sample.diameter_m),
             field: radius(instrument.detector.field_diameter_m),
+            dimension,
         })
     }
 
@@ -57,6 +60,11 @@ impl Footprint {
     pub fn share(&self, wi: DVec3, wo: DVec3) -> f64 {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return 0.0;
+        }
+        if self.dimension == Dimension::Flat {
+            // Three centred lengths of a line.
+            let length = (self.beam / wi.z).min(self.sample).min(self.field / wo.z);
+            return (wi.z * length / self.beam).min(1.0);
         }
         let outlines = [Outline::across(wi, self.beam), Outline::disc(self.sample), Outline::across(wo, self.field)];
         let mut ends: Vec<f64> = vec![0.0, PI];
@@ -151,7 +159,8 @@ mod tests {
 
     fn share(sizes: [f64; 3], wi: (f64, f64), wo: (f64, f64)) -> f64 {
         let [beam, sample, field] = sizes;
-        Footprint { beam, sample, field }.share(direction_deg(wi.0, wi.1), direction_deg(wo.0, wo.1))
+        Footprint { beam, sample, field, dimension: Dimension::Space }
+            .share(direction_deg(wi.0, wi.1), direction_deg(wo.0, wo.1))
     }
 
     #[test]
@@ -192,6 +201,18 @@ mod tests {
             let got = share(close, wi, wo);
             assert!((got - (a.z * area / PI).min(1.0)).abs() < 1e-9, "{wi:?} {wo:?}: {got}");
         }
+    }
+
+    #[test]
+    fn in_the_flat_world_the_shortest_length_counts() {
+        let at = |sizes: [f64; 3], theta_i: f64, theta_o: f64| {
+            let [beam, sample, field] = sizes;
+            let footprint = Footprint { beam, sample, field, dimension: Dimension::Flat };
+            footprint.share(direction_deg(theta_i, 0.0), direction_deg(theta_o, 180.0))
+        };
+        assert!((at([1.0, f64::INFINITY, 0.5], 60.0, 60.0) - 0.5).abs() < 1e-14);
+        assert!((at([1.0, 0.5, f64::INFINITY], 60.0, 0.0) - 0.25).abs() < 1e-14);
+        assert_eq!(at([1.0, 2.1, f64::INFINITY], 60.0, 0.0), 1.0);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 use glam::DVec3;
 
 use super::{Block, Entry, Maker, Pass, stated};
+use crate::measurement::Dimension;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "sample height",
@@ -16,7 +17,7 @@ pub(super) const EFFECT: Entry = Entry {
     },
     make: |maker: &Maker<'_>| {
         let (source, detector) = (maker.instrument.source.distance_m, maker.instrument.detector.distance_m);
-        Some(Box::new(Height { above: maker.actual.height_m, source, detector }))
+        Some(Box::new(Height { above: maker.actual.height_m, source, detector, dimension: maker.dimension }))
     },
 };
 
@@ -24,13 +25,14 @@ struct Height {
     above: f64,
     source: f64,
     detector: f64,
+    dimension: Dimension,
 }
 
 impl Pass for Height {
     fn apply(&self, block: &mut Block<'_>) {
         for i in 0..block.readings.len() {
-            let (wi, near_i) = seen(block.wi[i], self.above, self.source);
-            let (wo, near_o) = seen(block.wo[i], self.above, self.detector);
+            let (wi, near_i) = seen(block.wi[i], self.above, self.source, self.dimension);
+            let (wo, near_o) = seen(block.wo[i], self.above, self.detector, self.dimension);
             (block.wi[i], block.wo[i]) = (wi, wo);
             // The signal is 1 yet: what the light's pass multiplies.
             block.scale(i, near_i * near_o);
@@ -38,13 +40,15 @@ impl Pass for Height {
     }
 }
 
-/// The direction and the factor 1/r² of what stands `distance` away along `w`, seen from `height` above the crossing; 0 is far away.
-pub(in crate::gonio) fn seen(w: DVec3, height: f64, distance: f64) -> (DVec3, f64) {
+/// The direction and the factor 1/r² (1/r in the flat world) of what stands `distance` away along `w`, seen from `height` above the crossing; 0 is
+/// far away.
+pub(in crate::gonio) fn seen(w: DVec3, height: f64, distance: f64, dimension: Dimension) -> (DVec3, f64) {
     if distance == 0.0 {
         return (w, 1.0);
     }
     let from_spot = w - DVec3::Z * (height / distance);
-    (from_spot.normalize(), 1.0 / from_spot.length_squared())
+    let r = from_spot.length();
+    (from_spot / r, if dimension == Dimension::Flat { 1.0 / r } else { 1.0 / (r * r) })
 }
 
 #[cfg(test)]
@@ -54,11 +58,13 @@ mod tests {
     /// Along the normal: nearer by h, no other direction. To first order 1 + 2 h cosθ/r and an angle of h sinθ/r away from the normal.
     #[test]
     fn a_higher_surface_is_nearer_and_seen_from_lower_down() {
-        assert_eq!(seen(DVec3::Z, 0.1, 1.0), (DVec3::Z, 1.0 / 0.9f64.powi(2)));
-        assert_eq!(seen(DVec3::Z, 0.1, 0.0), (DVec3::Z, 1.0));
+        let space = Dimension::Space;
+        assert_eq!(seen(DVec3::Z, 0.1, 1.0, space), (DVec3::Z, 1.0 / (0.9 * 0.9)));
+        assert_eq!(seen(DVec3::Z, 0.1, 1.0, Dimension::Flat), (DVec3::Z, 1.0 / 0.9));
+        assert_eq!(seen(DVec3::Z, 0.1, 0.0, space), (DVec3::Z, 1.0));
         let w = DVec3::new(0.6, 0.0, 0.8);
         for height in [1e-3, 1e-4, 1e-5] {
-            let (from, near) = seen(w, height, 2.0);
+            let (from, near) = seen(w, height, 2.0, space);
             let angle = from.x.atan2(from.z) - w.x.atan2(w.z);
             assert!((near - 1.0 - height * 0.8).abs() < height * height);
             assert!((angle - 0.5 * height * 0.6).abs() < height * height);

@@ -4,6 +4,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::{Block, Entry, Maker, Pass, stated};
 use crate::geometry::angles::turned;
+use crate::measurement::Dimension;
 use crate::numeric::random::{Purpose, stream};
 
 pub(super) const EFFECT: Entry = Entry {
@@ -11,7 +12,7 @@ pub(super) const EFFECT: Entry = Entry {
     calls: |i| stated(i.axes.jitter_deg, "axes.jitter_deg", "°"),
     make: |maker: &Maker<'_>| {
         let sigma = maker.instrument.axes.jitter_deg.to_radians();
-        Some(Box::new(Jitter { seed: maker.seed, sigma }))
+        Some(Box::new(Jitter { seed: maker.seed, sigma, is_flat: maker.dimension == Dimension::Flat }))
     },
 };
 
@@ -19,6 +20,8 @@ struct Jitter {
     seed: u64,
     /// rad.
     sigma: f64,
+    /// Whether axes of azimuth are none.
+    is_flat: bool,
 }
 
 impl Pass for Jitter {
@@ -26,8 +29,10 @@ impl Pass for Jitter {
         for (i, reading) in block.readings.iter().enumerate() {
             let rng = &mut stream(self.seed, Purpose::Jitter, u64::from(reading.stop));
             let mut draw = || -> f64 { self.sigma * Distribution::<f64>::sample(&StandardNormal, rng) };
-            block.wi[i] = turned(block.wi[i], draw(), draw());
-            block.wo[i] = turned(block.wo[i], draw(), draw());
+            let [theta_i, phi_i, theta_o, phi_o] = [draw(), draw(), draw(), draw()];
+            let round = if self.is_flat { 0.0 } else { 1.0 };
+            block.wi[i] = turned(block.wi[i], theta_i, round * phi_i);
+            block.wo[i] = turned(block.wo[i], theta_o, round * phi_o);
         }
     }
 }

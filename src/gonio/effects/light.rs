@@ -12,6 +12,7 @@ use super::{Block, Maker, Pass};
 use crate::gonio::parts::Reference;
 use crate::gonio::reading::Kind;
 use crate::gonio::simulate::Truth;
+use crate::measurement::Dimension;
 
 /// The pass that turns directions into electrons a second: f·cosθo where source and aperture are points, else its mean.
 pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + 'a> {
@@ -22,12 +23,12 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     let light = Light {
         gain: instrument.gain(),
         truth: maker.truth,
-        standard: Standard::new(&instrument.reference, maker.actual.certificate),
+        standard: Standard::new(&instrument.reference, maker.actual.certificate, maker.dimension),
     };
     if source == 0.0 && detector == 0.0 {
         return Box::new(light);
     }
-    Box::new(Spread { light, cones: Cones::new(source, detector, maker.accuracy) })
+    Box::new(Spread { light, cones: Cones::new(source, detector, maker.accuracy, maker.dimension) })
 }
 
 /// The BRDF of the reference standard.
@@ -41,12 +42,14 @@ pub(in crate::gonio) struct Standard {
 
 impl Standard {
     /// The standard whose certificate is off by the share `error`.
-    pub fn new(reference: &Reference, error: f64) -> Self {
+    pub fn new(reference: &Reference, error: f64, dimension: Dimension) -> Self {
         let certified = reference.theta_i_deg.to_radians().cos() * reference.theta_o_deg.to_radians().cos();
-        Self { level: reference.reflectance * (1.0 + error) * FRAC_1_PI, shape: reference.shape, certified }
+        // 1/π, in the flat world 1/2, of what is reflected.
+        let even = if dimension == Dimension::Flat { 0.5 } else { FRAC_1_PI };
+        Self { level: reference.reflectance * (1.0 + error) * even, shape: reference.shape, certified }
     }
 
-    /// 1/sr.
+    /// 1/sr; 1/rad in the flat world.
     pub fn value(&self, wi: DVec3, wo: DVec3) -> f64 {
         self.level * (1.0 + self.shape * (wi.z * wo.z - self.certified))
     }
@@ -130,7 +133,7 @@ mod tests {
     fn the_standard_has_its_certificate_s_value_at_the_certificate_s_geometry() {
         let reference = Reference { reflectance: 0.98, shape: 0.3, ..Reference::default() };
         let (wi, wo) = reference_pair(&reference);
-        let standard = Standard::new(&reference, 0.01);
+        let standard = Standard::new(&reference, 0.01, Dimension::Space);
         assert!((standard.value(wi, wo) * std::f64::consts::PI / (0.98 * 1.01) - 1.0).abs() < 1e-15);
         assert!(standard.value(wi, DVec3::new(0.999, 0.0, 0.044)) < standard.value(wi, wo));
     }

@@ -29,6 +29,7 @@ use super::instrument::Instrument;
 use super::reading::Reading;
 use super::simulate::Truth;
 use crate::control::Plan;
+use crate::measurement::Dimension;
 
 /// Some readings in a row, on their way from directions to electrons.
 pub(super) struct Block<'a> {
@@ -72,6 +73,7 @@ pub(super) trait Pass: Sync {
 /// What the passes are made from.
 pub(super) struct Maker<'a> {
     pub instrument: &'a Instrument,
+    pub dimension: Dimension,
     pub actual: &'a Actual,
     pub truth: &'a Truth<'a>,
     pub seed: u64,

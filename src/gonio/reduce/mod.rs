@@ -71,8 +71,8 @@ pub fn reduce(
     if has_reference != instrument.has_reference() {
         return Err(if has_reference { ReduceError::NoCertificate } else { ReduceError::NoScale });
     }
-    let visits = Visits::new(&stops, raw.channels.len(), instrument);
-    Ok(Work { raw, instrument, scale: Scale::new(instrument), visits }.run(name, &stops, model))
+    let visits = Visits::new(&stops, raw, instrument);
+    Ok(Work { raw, instrument, scale: Scale::new(instrument, raw.dimension), visits }.run(name, &stops, model))
 }
 
 /// What turns a net rate into a BRDF.
@@ -83,11 +83,11 @@ struct Scale {
 }
 
 impl Scale {
-    fn new(instrument: &Instrument) -> Self {
-        let footprint = Footprint::of(instrument);
+    fn new(instrument: &Instrument, dimension: Dimension) -> Self {
+        let footprint = Footprint::of(instrument, dimension);
         let (wi, wo) = reference_pair(&instrument.reference);
         let share = footprint.map_or(1.0, |f| f.share(wi, wo));
-        let standard = Standard::new(&instrument.reference, 0.0);
+        let standard = Standard::new(&instrument.reference, 0.0, dimension);
         let of_standard = standard.value(wi, wo) * wo.z * share;
         Self { footprint, reference: if instrument.has_reference() { of_standard } else { 1.0 / instrument.gain() } }
     }
@@ -147,7 +147,7 @@ impl Work<'_> {
         let measurement = Measurement {
             notes,
             origin: format!("reduced from {} readings", self.raw.readings.len()),
-            dimension: Dimension::Space,
+            dimension: self.raw.dimension,
             weights: self.raw.weights.clone(),
             masked: Masked { marked, ..Masked::default() },
             sigma: self.instrument.is_noisy().then(|| table.sigma()),

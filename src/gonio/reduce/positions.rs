@@ -17,6 +17,7 @@ use crate::gonio::effects::tilt::frame;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::simulate::Truth;
+use crate::measurement::Dimension;
 
 /// Relative error of means over cones that slopes may have.
 const ACCURACY: f64 = 1e-3;
@@ -33,7 +34,7 @@ struct Pose {
 type Off = (usize, fn(f64) -> Pose, f64);
 
 /// Every error of positions that the instrument has.
-fn errors(instrument: &Instrument) -> Vec<Off> {
+fn errors(instrument: &Instrument, dimension: Dimension) -> Vec<Off> {
     let (zero, jitter) = (instrument.axes.zero_u_deg.to_radians(), instrument.axes.jitter_deg.to_radians());
     let tilt = instrument.sample.tilt_u_deg.to_radians();
     let axes: [fn(f64) -> Pose; 4] = [
@@ -45,40 +46,51 @@ fn errors(instrument: &Instrument) -> Vec<Off> {
     let tilts: [fn(f64) -> Pose; 2] =
         [|x| Pose { tilt: [x, 0.0], ..Pose::default() }, |x| Pose { tilt: [0.0, x], ..Pose::default() }];
     let height: fn(f64) -> Pose = |height| Pose { height, ..Pose::default() };
-    let mut list: Vec<Off> = axes.iter().map(|of| (ZEROS, *of, zero)).collect();
-    list.extend(tilts.iter().map(|of| (TILT, *of, tilt)));
+    // The flat world has no azimuth, and leans one way only.
+    let step = if dimension == Dimension::Flat { 2 } else { 1 };
+    let (axes, tilts) = (|| axes.iter().step_by(step), tilts.iter().step_by(step));
+    let mut list: Vec<Off> = axes().map(|of| (ZEROS, *of, zero)).collect();
+    list.extend(tilts.map(|of| (TILT, *of, tilt)));
     list.push((HEIGHT, height, instrument.sample.height_u_m));
-    list.extend(axes.iter().map(|of| (JITTER, *of, jitter)));
+    list.extend(axes().map(|of| (JITTER, *of, jitter)));
     list.retain(|(_, _, sigma)| *sigma > 0.0);
     list
 }
 
 /// Whether the instrument has any.
 pub(in crate::gonio) fn matter(instrument: &Instrument) -> bool {
-    !errors(instrument).is_empty()
+    !errors(instrument, Dimension::Space).is_empty()
 }
 
 /// The optics with all that directions meet.
 struct Optics<'a> {
     instrument: &'a Instrument,
+    dimension: Dimension,
     cones: Cones,
     footprint: Option<Footprint>,
 }
 
 impl<'a> Optics<'a> {
-    fn new(instrument: &'a Instrument) -> Self {
+    fn new(instrument: &'a Instrument, dimension: Dimension) -> Self {
         let half = |deg: f64| 0.5 * deg.to_radians();
-        let cones =
-            Cones::new(half(instrument.source.divergence_deg), half(instrument.detector.aperture_deg), ACCURACY);
-        Self { instrument, cones, footprint: Footprint::of(instrument) }
+        let cones = Cones::new(
+            half(instrument.source.divergence_deg),
+            half(instrument.detector.aperture_deg),
+            ACCURACY,
+            dimension,
+        );
+        Self { instrument, dimension, cones, footprint: Footprint::of(instrument, dimension) }
     }
 
     /// Mean of f·cosθo times the share of the beam, all channels, with everything off by `pose`.
     fn flux(&self, (wi, wo): (DVec3, DVec3), pose: &Pose, f: &Truth<'_>, width: usize) -> Vec<f64> {
         let [theta_i, phi_i, theta_o, phi_o] = pose.zeros;
         let turn = frame(pose.tilt);
-        let (wi, near_i) = seen(turn * turned(wi, theta_i, phi_i), pose.height, self.instrument.source.distance_m);
-        let (wo, near_o) = seen(turn * turned(wo, theta_o, phi_o), pose.height, self.instrument.detector.distance_m);
+        let from_spot = |w: DVec3, theta: f64, phi: f64, distance: f64| {
+            seen(turn * turned(w, theta, phi), pose.height, distance, self.dimension)
+        };
+        let (wi, near_i) = from_spot(wi, theta_i, phi_i, self.instrument.source.distance_m);
+        let (wo, near_o) = from_spot(wo, theta_o, phi_o, self.instrument.detector.distance_m);
         let share = near_i * near_o * self.footprint.map_or(1.0, |f| f.share(wi, wo));
         let (mut own, mut out) = (vec![0.0; width], vec![0.0; width]);
         let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
@@ -114,7 +126,7 @@ impl<'a> Optics<'a> {
         if !self.instrument.has_reference() {
             return vec![(0.0, 0.0); errors.len()];
         }
-        let standard = Standard::new(&self.instrument.reference, 0.0);
+        let standard = Standard::new(&self.instrument.reference, 0.0, self.dimension);
         let f = |wi: DVec3, wo: DVec3, out: &mut [f64]| {
             out.fill(standard.value(wi, wo));
             true
@@ -125,20 +137,21 @@ impl<'a> Optics<'a> {
 }
 
 /// Relative σ of the reference's reading by where the axes stop.
-pub(super) fn of_reference(instrument: &Instrument) -> f64 {
-    let jitter: Vec<Off> = errors(instrument).into_iter().filter(|(family, _, _)| *family == JITTER).collect();
-    let list = Optics::new(instrument).of_reference(&jitter);
+pub(super) fn of_reference(instrument: &Instrument, dimension: Dimension) -> f64 {
+    let jitter: Vec<Off> =
+        errors(instrument, dimension).into_iter().filter(|(family, _, _)| *family == JITTER).collect();
+    let list = Optics::new(instrument, dimension).of_reference(&jitter);
     list.iter().map(|(u, q)| u * u + 3.0 * q * q).sum::<f64>().sqrt()
 }
 
 /// Adds what errors of positions do to every reading.
 pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: &Table, shared: &mut Shared<'_>) {
-    let errors = errors(instrument);
+    let errors = errors(instrument, raw.dimension);
     if errors.is_empty() {
         return;
     }
     let (n, width) = (raw.directions.len(), raw.channels.len());
-    let optics = Optics::new(instrument);
+    let optics = Optics::new(instrument, raw.dimension);
     let reference = optics.of_reference(&errors);
     let is_valid = |entry: &usize| (0..width).any(|c| table.values[c * n + entry].is_finite());
     let valid: Vec<usize> = (0..n).filter(is_valid).collect();

@@ -3,6 +3,7 @@
 use super::positions;
 use super::stops::Stop;
 use crate::gonio::instrument::Instrument;
+use crate::gonio::raw::Raw;
 use crate::gonio::reading::Kind;
 
 /// What was read at one visit, channel by channel.
@@ -44,8 +45,8 @@ pub(super) struct At {
 }
 
 impl Visits {
-    pub fn new(stops: &[Stop], width: usize, instrument: &Instrument) -> Self {
-        let jitter = positions::of_reference(instrument);
+    pub fn new(stops: &[Stop], raw: &Raw, instrument: &Instrument) -> Self {
+        let (width, jitter) = (raw.channels.len(), positions::of_reference(instrument, raw.dimension));
         let runs = stops.chunk_by(|a, b| (a.kind == Kind::Sample) == (b.kind == Kind::Sample));
         let visits: Vec<Visit> =
             runs.filter(|run| run[0].kind != Kind::Sample).map(|run| Visit::new(run, width, jitter)).collect();

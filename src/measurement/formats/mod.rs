@@ -22,7 +22,7 @@ mod zemax;
 use std::io::Write;
 use std::path::Path;
 
-pub(crate) use self::csv::{is_reserved, push_number, spherical_deg};
+pub(crate) use self::csv::{flat_deg, is_reserved, push_number, spherical_deg};
 use self::source::Source;
 use super::{Dimension, Directions, Measurement, MeasurementError, MerlAngles, Weights};
 

@@ -18,7 +18,7 @@ mod write;
 
 pub(super) use read::{read, read_directions};
 pub(super) use write::write;
-pub(crate) use write::{push_number, spherical_deg};
+pub(crate) use write::{flat_deg, push_number, spherical_deg};
 
 use crate::measurement::MerlAngles;
 

@@ -137,7 +137,7 @@ pub(crate) fn spherical_deg(w: DVec3) -> [f64; 2] {
 }
 
 /// The signed θ (deg) of a direction of the flat world.
-fn flat_deg(w: DVec3) -> f64 {
+pub(crate) fn flat_deg(w: DVec3) -> f64 {
     let theta = refine(w.x.atan2(w.z).to_degrees(), w.x, w.z);
     let rounded = round(theta);
     if (direction_deg(rounded, 0.0) - w).abs().max_element() <= f64::EPSILON { rounded } else { theta }

@@ -1,0 +1,68 @@
+//! Functions of one angle, interpolated: pieces as wide as the lobe's own scale, a Chebyshev polynomial on each.
+
+use std::f64::consts::PI;
+
+/// Nodes of a piece.
+const NODES: usize = 12;
+
+/// `F` functions of an angle from 0 on, 0 beyond the last piece.
+#[derive(Debug)]
+pub(super) struct Table<const F: usize> {
+    /// Ends of the pieces, from 0 on, ascending.
+    ends: Vec<f64>,
+    /// Chebyshev coefficients of each piece.
+    pieces: Vec<[[f64; F]; NODES]>,
+}
+
+impl<const F: usize> Table<F> {
+    /// Tabulates `f` between these ends (rad, ascending, the first 0).
+    pub fn new(ends: Vec<f64>, f: impl Fn(f64) -> [f64; F]) -> Self {
+        let pieces = ends.windows(2).map(|e| coefficients(e[0], e[1], &f)).collect();
+        Self { ends, pieces }
+    }
+
+    /// The functions at `alpha` ≥ 0.
+    pub fn at(&self, alpha: f64) -> [f64; F] {
+        let after = self.ends.partition_point(|e| *e <= alpha);
+        let Some(piece) = self.pieces.get(after.wrapping_sub(1)) else { return [0.0; F] };
+        let (from, to) = (self.ends[after - 1], self.ends[after]);
+        clenshaw(piece, (2.0 * alpha - from - to) / (to - from))
+    }
+}
+
+fn coefficients<const F: usize>(from: f64, to: f64, f: impl Fn(f64) -> [f64; F]) -> [[f64; F]; NODES] {
+    let angle = |k: usize| PI * (k as f64 + 0.5) / NODES as f64;
+    let values: [[f64; F]; NODES] = std::array::from_fn(|k| f(0.5 * (from + to) + 0.5 * (to - from) * angle(k).cos()));
+    std::array::from_fn(|j| {
+        let scale = if j == 0 { 1.0 } else { 2.0 } / NODES as f64;
+        std::array::from_fn(|i| {
+            scale * values.iter().enumerate().map(|(k, v)| v[i] * (j as f64 * angle(k)).cos()).sum::<f64>()
+        })
+    })
+}
+
+fn clenshaw<const F: usize>(piece: &[[f64; F]; NODES], x: f64) -> [f64; F] {
+    let (mut next, mut after) = ([0.0; F], [0.0; F]);
+    for c in piece[1..].iter().rev() {
+        for i in 0..F {
+            (next[i], after[i]) = (c[i] + 2.0 * x * next[i] - after[i], next[i]);
+        }
+    }
+    std::array::from_fn(|i| piece[0][i] + x * next[i] - after[i])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smooth_functions_come_back() {
+        let table = Table::new(vec![0.0, 0.5, 1.5], |x| [(-x * x).exp(), x.sin()]);
+        for k in 0..150 {
+            let x = 0.01 * f64::from(k);
+            let [a, b] = table.at(x);
+            assert!((a - (-x * x).exp()).abs() < 1e-10 && (b - x.sin()).abs() < 1e-12, "{x}");
+        }
+        assert_eq!(table.at(1.5), [0.0; 2]);
+    }
+}
