@@ -10,6 +10,8 @@ mod demo;
 mod failure;
 mod fit;
 mod info;
+mod instrument;
+mod instruments;
 mod models;
 mod output;
 mod reduce;
@@ -78,6 +80,8 @@ enum Command {
     Models(models::Args),
     /// List the built-in scenes, or print one as a file to start from
     Scenes(scenes::Args),
+    /// List the built-in instruments, or print one as a file to start from
+    Instruments(instruments::Args),
 }
 
 /// Runs the command that the process was started with.
@@ -122,6 +126,7 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
         Command::Convert(args) => convert::run(&args, ui),
         Command::Models(args) => models::run(&args, ui),
         Command::Scenes(args) => scenes::run(&args, ui),
+        Command::Instruments(args) => instruments::run(&args, ui),
     }
 }
 

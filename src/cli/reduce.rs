@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
+use super::instrument::read_instrument;
 use super::output::{
     check_folder, keeps_inputs, output_format, read_text, stdout_is_free, write_measurement, write_text,
 };
-use super::simulate::read_spec;
 use super::ui::Ui;
 use crate::chain;
 use crate::geometry::angles::{phi_of, theta_of};
@@ -22,9 +22,10 @@ use crate::gonio::{Instrument, Raw, Reduction};
 pub(super) struct Args {
     /// Raw readings: a CSV with kind, time_s, exposure_s, repeat and signals (`-` is stdin)
     raw: PathBuf,
-    /// What made them: a simulation file whose [instrument] counts; else what the raw file says of it
+    /// What made them: a built-in instrument (see `goniofit instruments`), or a simulation file whose [instrument] counts; else what
+    /// the raw file says of it
     #[arg(long, value_name = "I")]
-    instrument: Option<PathBuf>,
+    instrument: Option<String>,
     /// Where to write the measurement; `-` is CSV on stdout
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -35,7 +36,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let format = output_format(&args.out, None)?;
-    let inputs = || [Some(&args.raw), args.instrument.as_ref()].into_iter().flatten().map(PathBuf::as_path);
+    let inputs = || [Some(args.raw.as_path()), args.instrument.as_deref().map(Path::new)].into_iter().flatten();
     for (option, out) in [("--out", Some(&args.out)), ("--budget", args.budget.as_ref())] {
         let Some(out) = out else { continue };
         keeps_inputs(option, out, inputs())?;
@@ -43,7 +44,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     stdout_is_free(&args.out, ui)?;
     let (raw, told) = Raw::from_csv(&args.raw, &read_text(&args.raw)?)?;
-    let given = args.instrument.as_deref().map(read_spec).transpose()?.map(|spec| spec.instrument);
+    let given = args.instrument.as_deref().map(read_instrument).transpose()?;
     let instrument = given.or(told).unwrap_or_else(Instrument::noiseless);
     let name = args.raw.file_stem().map_or("reduced".into(), |s| s.to_string_lossy());
     let reduction = chain::reduced(&name, &raw, &instrument)?;

@@ -5,18 +5,17 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{
-    check_folder, keeps_inputs, output_format, read_text, stdout_is_free, write_measurement, write_text,
-};
+use super::instrument::{read_instrument, read_spec};
+use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, write_measurement, write_text};
 use super::ui::Ui;
 use crate::chain;
-use crate::gonio::{self, Instrument, Scan, SimulationSpec};
+use crate::gonio::{self, Instrument, Scan};
 use crate::measurement::{ReadOptions, formats};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit simulate --material glossy-paint --scan hemisphere:5 --seed 1 --out paint.csv
-  goniofit simulate --material satin --instrument lab.toml --scan in-plane:5 --raw raw.csv --out satin.csv
+  goniofit simulate --material satin --instrument commercial --scan in-plane:5 --raw raw.csv --out satin.csv
   goniofit simulate --material gold.json --scan merl --noiseless --out gold.binary")]
 pub(super) struct Args {
     /// A simulation file (`-` is stdin); options given beside it replace what it says
@@ -31,9 +30,10 @@ pub(super) struct Args {
     /// Seed of the noise [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// The instrument: a simulation file whose [instrument] counts (see docs/instrument.md)
+    /// The instrument: a built-in one (see `goniofit instruments`), or a simulation file whose [instrument] counts (see
+    /// docs/instrument.md)
     #[arg(long, value_name = "I")]
-    instrument: Option<PathBuf>,
+    instrument: Option<String>,
     /// Write the raw readings too, as CSV
     #[arg(long, value_name = "RAW.csv")]
     raw: Option<PathBuf>,
@@ -59,7 +59,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     check_folder(&args.out)?;
     if let Some(raw) = &args.raw {
         check_folder(raw)?;
-        let inputs = [args.spec.as_deref(), args.instrument.as_deref(), Some(&args.out)];
+        let inputs = [args.spec.as_deref(), args.instrument.as_deref().map(Path::new), Some(&args.out)];
         keeps_inputs("--raw", raw, inputs.into_iter().flatten())?;
     }
     stdout_is_free(&args.out, ui)?;
@@ -128,7 +128,7 @@ impl Plan {
         let list = scan.as_ref().and_then(|s| s.strip_prefix("list:"));
         keeps_inputs("--out", &args.out, [Some(&material[..]), list].into_iter().flatten().map(Path::new))?;
         let scan = scan.map_or(Ok(Scan::Hemisphere { step_deg: 5.0 }), |text| parse_scan(&text))?;
-        let of_file = args.instrument.as_deref().map(read_spec).transpose()?.map(|s| s.instrument);
+        let of_file = args.instrument.as_deref().map(read_instrument).transpose()?;
         let of_spec_file = || of_spec.map_or_else(Instrument::default, |s| s.instrument.clone());
         let mut instrument = of_file.unwrap_or_else(of_spec_file);
         if args.noiseless {
@@ -143,11 +143,6 @@ impl Plan {
         let seed = args.seed.or(of_spec.and_then(|s| s.seed)).unwrap_or(0);
         Ok(Self { material, scan, seed, instrument })
     }
-}
-
-pub(super) fn read_spec(path: &Path) -> Result<SimulationSpec, Failure> {
-    let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("{}: {e}", path.display()));
-    SimulationSpec::from_toml(&read_text(path)?).map_err(|e| wrong(&e))
 }
 
 /// A file that a simulation file names stands beside it; a built-in material's name stays.

@@ -8,6 +8,9 @@ use super::instrument::Instrument;
 pub struct SimulationSpec {
     /// 1.
     pub version: u32,
+    /// What this is, in a few words; changes nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
     /// A built-in material or a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,

@@ -7,6 +7,7 @@ mod failures;
 mod fit_file;
 mod fit_options;
 mod help;
+mod instruments;
 #[cfg(unix)]
 mod interrupt;
 mod json;
