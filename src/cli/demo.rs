@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use super::failure::Failure;
 use super::fit::plus_minus;
+use super::instrument::read_instrument;
 use super::output::make_folder;
-use super::simulate::read_spec;
 use super::ui::{self, Ui};
 use crate::brdf::PerChannel;
 use crate::chain::{Demo, DemoFit, DemoOptions, demo};
@@ -14,15 +14,16 @@ use crate::image::Comparison;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  goniofit demo --out my-demo\n  goniofit demo --instrument lab.toml --out lab-demo"
+    after_help = "Examples:\n  goniofit demo --out my-demo\n  goniofit demo --instrument commercial --out lab-demo"
 )]
 pub(super) struct Args {
     /// Folder to write to
     #[arg(long, default_value = "out/demo", value_name = "DIR")]
     out: PathBuf,
-    /// What measures: a simulation file whose [instrument] counts; without it a noisy detector alone
+    /// What measures: a built-in instrument (see `goniofit instruments`) or a simulation file whose [instrument] counts; without it a noisy
+    /// detector alone
     #[arg(long, value_name = "I")]
-    instrument: Option<PathBuf>,
+    instrument: Option<String>,
     /// Seed of noise and pictures
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
@@ -37,7 +38,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     make_folder("--out", &args.out)?;
     let instrument = match &args.instrument {
-        Some(path) => Some((path.display().to_string(), read_spec(path)?.instrument)),
+        Some(name) => Some((name.clone(), read_instrument(name)?)),
         None => None,
     };
     let options = DemoOptions { size: args.size, samples: args.samples, seed: args.seed, instrument };

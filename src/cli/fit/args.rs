@@ -19,7 +19,7 @@ const OUTPUT: &str = "Output";
   goniofit fit gold.binary --model auto
   goniofit fit lab.csv --use-sigma --robust cauchy
   goniofit fit gold.binary --fix phong.exponent=50 --bound lambert.weight=0..0.3
-  goniofit fit satin.csv --through lab.toml
+  goniofit fit satin.csv --through commercial
   goniofit fit gold.binary --target-rmse-excess 1%")]
 #[allow(clippy::struct_excessive_bools)] // each is an option of its own
 pub(in crate::cli) struct Args {
@@ -37,9 +37,9 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "huber|cauchy[:SCALE]", help_heading = MODEL)]
     pub robust: Option<Robust>,
     /// Fit the material that this instrument's readings show, averaged over its aperture and its source's divergence as they are, rather
-    /// than take the readings for the material's values: a simulation file whose [instrument] counts
+    /// than take the readings for the material's values: a built-in one or a simulation file
     #[arg(long, value_name = "INSTRUMENT", help_heading = MODEL)]
-    pub through: Option<PathBuf>,
+    pub through: Option<String>,
     /// How samples count
     #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform", help_heading = SAMPLES)]
     pub weights: WeightMode,

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::args::{Args, Wanted};
 use crate::brdf::{Sight, SpecError};
 use crate::cli::failure::Failure;
+use crate::cli::instrument::read_instrument;
 use crate::cli::output::keeps_inputs;
-use crate::cli::simulate::read_spec;
 use crate::fit::{Bootstrap, FitOptions, Limit};
 use crate::gonio::sight::Cones;
 
@@ -45,14 +45,13 @@ impl Args {
 
     /// What lobes are seen through.
     fn sight(&self) -> Result<Option<Arc<dyn Sight>>, Failure> {
-        let Some(path) = &self.through else { return Ok(None) };
-        let instrument = read_spec(path)?.instrument;
+        let Some(name) = &self.through else { return Ok(None) };
+        let instrument = read_instrument(name)?;
         match Cones::of(&instrument) {
             Some(cones) => Ok(Some(Arc::new(cones))),
             None => Err(Failure::usage(format!(
-                "--through {}: expected an instrument with an aperture (instrument.detector.aperture_deg) or a divergence \
-                 (instrument.source.divergence_deg), found points, through which a fit is the plain one",
-                path.display()
+                "--through {name}: expected an instrument with an aperture (instrument.detector.aperture_deg) or a divergence \
+                 (instrument.source.divergence_deg), found points, through which a fit is the plain one"
             ))),
         }
     }

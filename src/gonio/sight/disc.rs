@@ -61,14 +61,15 @@ impl Disc {
     ) -> [(Jet, Jet, Jet); F] {
         let (rings, around) = (orders.0.ceil() as usize, orders.1.ceil() as usize);
         let depth = 2.0 * (0.5 * self.half).sin().powi(2);
+        let cosines: Vec<f64> = (0..around).map(|k| (PI * (k as f64 + 0.5) / around as f64).cos()).collect();
         let mut sums = [([0.0; 2], [0.0; 2], [0.0; 2]); F];
         for &(x, w) in gauss_legendre(rings).iter() {
             let fall = depth * 0.5 * (1.0 + x);
             let (sin, cos) = ((fall * (2.0 - fall)).sqrt(), 1.0 - fall);
             let gamma = 2.0 * (0.5 * fall).sqrt().asin();
-            for k in 0..around {
-                let cos_t = (PI * (k as f64 + 0.5) / around as f64).cos();
-                let values = f(2.0 * (0.5 * versine(alpha, gamma, cos_t)).sqrt().min(1.0).asin());
+            let (nearest, slope) = (versine(alpha, gamma, -1.0), sin * alpha.sin());
+            for &cos_t in &cosines {
+                let values = f(2.0 * (0.5 * (nearest + slope * (1.0 + cos_t))).sqrt().min(1.0).asin());
                 let weight = 0.5 * w / around as f64;
                 for ((mean, along, across), value) in sums.iter_mut().zip(values) {
                     for j in 0..2 {

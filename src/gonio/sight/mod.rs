@@ -75,7 +75,8 @@ impl Cones {
         if self.detector.half == 0.0 {
             return Table::new(ends(n, large, 0.0), |alpha| joined(self.source.moments(n, alpha).mean, [0.0; 2]));
         }
-        let orders = (6.0 + 4.0 * (small * n.sqrt()).min(24.0), 8.0 + 6.0 * (small * n.sqrt()).min(24.0));
+        let width = (small * n.sqrt()).min(SHARPEST);
+        let orders = (6.0 + 4.0 * width, 8.0 + 6.0 * width);
         if self.detector.half >= self.source.half {
             // For each r′ the mean over the aperture is P wo + Q r′; P and Q r′ are averaged over the source.
             let inner = Table::new(ends(n, large, 0.0), |alpha| {
@@ -101,6 +102,8 @@ fn pair(of: [f64; 4]) -> [Jet; 2] {
     [[of[0], of[2]], [of[1], of[3]]]
 }
 
+/// Half angle of the smaller cone times √n from which on its rule grows no finer: the edges that a lobe so sharp leaves are averaged all the same.
+const SHARPEST: f64 = 10.0;
 /// ln of the share of its peak below which a lobe is nothing.
 const NOTHING: f64 = -80.0;
 /// Width of a piece in units of the lobe's, 1/√n.

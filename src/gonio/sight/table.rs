@@ -10,23 +10,34 @@ const NODES: usize = 12;
 pub(super) struct Table<const F: usize> {
     /// Ends of the pieces, from 0 on, ascending.
     ends: Vec<f64>,
+    /// The piece that each of many equal steps of the whole range begins in.
+    first: Vec<u32>,
+    /// Steps over rad.
+    per_rad: f64,
     /// Chebyshev coefficients of each piece.
     pieces: Vec<[[f64; F]; NODES]>,
 }
 
 impl<const F: usize> Table<F> {
-    /// Tabulates `f` between these ends (rad, ascending, the first 0).
+    /// Tabulates `f` between these ends (rad, ascending, the first 0, two at least).
     pub fn new(ends: Vec<f64>, f: impl Fn(f64) -> [f64; F]) -> Self {
-        let pieces = ends.windows(2).map(|e| coefficients(e[0], e[1], &f)).collect();
-        Self { ends, pieces }
+        let pieces: Vec<_> = ends.windows(2).map(|e| coefficients(e[0], e[1], &f)).collect();
+        let (steps, last) = (2 * pieces.len(), ends[pieces.len()]);
+        let piece_at = |alpha: f64| ends.partition_point(|e| *e <= alpha).saturating_sub(1) as u32;
+        let first = (0..steps).map(|k| piece_at(last * k as f64 / steps as f64)).collect();
+        Self { first, per_rad: steps as f64 / last, ends, pieces }
     }
 
     /// The functions at `alpha` ≥ 0.
     pub fn at(&self, alpha: f64) -> [f64; F] {
-        let after = self.ends.partition_point(|e| *e <= alpha);
-        let Some(piece) = self.pieces.get(after.wrapping_sub(1)) else { return [0.0; F] };
-        let (from, to) = (self.ends[after - 1], self.ends[after]);
-        clenshaw(piece, (2.0 * alpha - from - to) / (to - from))
+        let Some(first) = self.first.get((alpha * self.per_rad) as usize) else { return [0.0; F] };
+        // Rounding may put an angle at a step's edge into the next step.
+        let mut k = (*first as usize).saturating_sub(usize::from(self.ends[*first as usize] > alpha));
+        while k + 1 < self.pieces.len() && self.ends[k + 1] <= alpha {
+            k += 1;
+        }
+        let (from, to) = (self.ends[k], self.ends[k + 1]);
+        clenshaw(&self.pieces[k], (2.0 * alpha - from - to) / (to - from))
     }
 }
 
