@@ -5,6 +5,7 @@
 
 use std::time::Instant;
 
+#[allow(dead_code)] // tests use the rest
 #[path = "../tests/instrument/experiment.rs"]
 mod experiment;
 
