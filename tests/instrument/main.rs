@@ -3,9 +3,13 @@
 // Tests may fail loudly.
 #![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
+mod budget;
 mod coverage;
+#[allow(dead_code)] // its study prints more than tests judge
+mod experiment;
 mod flat;
 mod limits;
+mod presets;
 mod raw;
 mod support;
 mod through;

@@ -7,6 +7,7 @@
 mod budget;
 pub(super) mod positions;
 mod shared;
+mod spread;
 mod stops;
 mod visits;
 
@@ -52,7 +53,8 @@ pub struct Reduction {
     pub budget: Budget,
 }
 
-/// Reduces readings that an instrument of this description made. `model` is the material, about: errors of positions are worked out from its
+/// Reduces readings that an instrument of this description made. `model` is what is read, about (the material's mean over source
+/// and aperture): errors of positions are worked out from its
 /// slopes; without it they are left out, and a note says so.
 ///
 /// # Errors
@@ -88,13 +90,23 @@ impl Scale {
         let (wi, wo) = reference_pair(&instrument.reference);
         let share = footprint.map_or(1.0, |f| f.share(wi, wo));
         let standard = Standard::new(&instrument.reference, 0.0, dimension);
-        let of_standard = standard.value(wi, wo) * wo.z * share;
+        let of_standard = standard.value(wi, wo) * wo.z * mean_cos(instrument, dimension) * share;
         Self { footprint, reference: if instrument.has_reference() { of_standard } else { 1.0 / instrument.gain() } }
     }
 
     /// BRDF over (net rate / reference's net rate), or over the net rate.
     fn of(&self, wi: DVec3, wo: DVec3) -> f64 {
         self.reference / (wo.z * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
+    }
+}
+
+/// The mean of cosθo over the aperture, over its value in the middle: what the aperture takes from a diffuse standard.
+fn mean_cos(instrument: &Instrument, dimension: Dimension) -> f64 {
+    let half = 0.5 * instrument.detector.aperture_deg.to_radians();
+    match dimension {
+        Dimension::Space => (0.5 * half).cos().powi(2),
+        Dimension::Flat if half == 0.0 => 1.0,
+        Dimension::Flat => half.sin() / half,
     }
 }
 

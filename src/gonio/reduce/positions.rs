@@ -1,15 +1,19 @@
-//! Errors of positions: what a reading changes by when axes, tilt or height are off by their uncertainties, by a model of the material.
+//! Errors of positions: what a reading changes by when axes, tilt or height are off by their uncertainties, by a model of what is read.
 //!
 //! Each error is moved by ± its σ. Half the difference is the component u, the same error in all readings (of jitter: each reading's own); the
 //! average of both less the value in the middle, q, is what the error's square does: its mean square is 3 q², which counts as the reading's own.
+//! Where squares matter the errors' effect is no normal distribution: there [`super::spread`] draws them all, and the variance is that of the normal
+//! distribution whose 95 % interval is as wide.
+//!
+//! The model is what is read, the mean over source and aperture in it: a fit to readings has seen that mean already.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Table;
 use super::shared::{HEIGHT, JITTER, Shared, TILT, ZEROS};
+use super::spread;
 use crate::geometry::angles::turned;
-use crate::gonio::effects::cone::Cones;
 use crate::gonio::effects::footprint::Footprint;
 use crate::gonio::effects::height::seen;
 use crate::gonio::effects::light::{Standard, reference_pair};
@@ -19,19 +23,30 @@ use crate::gonio::raw::Raw;
 use crate::gonio::simulate::Truth;
 use crate::measurement::Dimension;
 
-/// Relative error of means over cones that slopes may have.
-const ACCURACY: f64 = 1e-3;
+/// Share of the variance from which on squares of errors call for draws: a normal interval then holds 94.6 % of an exponential flank.
+const BENT: f64 = 0.02;
 
 /// By how much everything is off.
 #[derive(Debug, Clone, Copy, Default)]
-struct Pose {
+pub(super) struct Pose {
     zeros: [f64; 4],
     tilt: [f64; 2],
     height: f64,
 }
 
-/// One error: its line in the budget, and the pose that is off by its σ, times a sign.
-type Off = (usize, fn(f64) -> Pose, f64);
+impl Pose {
+    /// Both together.
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            zeros: std::array::from_fn(|i| self.zeros[i] + other.zeros[i]),
+            tilt: std::array::from_fn(|i| self.tilt[i] + other.tilt[i]),
+            height: self.height + other.height,
+        }
+    }
+}
+
+/// One error: its line in the budget, the pose that is off by it, and its σ.
+pub(super) type Off = (usize, fn(f64) -> Pose, f64);
 
 /// Every error of positions that the instrument has.
 fn errors(instrument: &Instrument, dimension: Dimension) -> Vec<Off> {
@@ -63,27 +78,19 @@ pub(in crate::gonio) fn matter(instrument: &Instrument) -> bool {
 }
 
 /// The optics with all that directions meet.
-struct Optics<'a> {
+pub(super) struct Optics<'a> {
     instrument: &'a Instrument,
     dimension: Dimension,
-    cones: Cones,
     footprint: Option<Footprint>,
 }
 
 impl<'a> Optics<'a> {
     fn new(instrument: &'a Instrument, dimension: Dimension) -> Self {
-        let half = |deg: f64| 0.5 * deg.to_radians();
-        let cones = Cones::new(
-            half(instrument.source.divergence_deg),
-            half(instrument.detector.aperture_deg),
-            ACCURACY,
-            dimension,
-        );
-        Self { instrument, dimension, cones, footprint: Footprint::of(instrument, dimension) }
+        Self { instrument, dimension, footprint: Footprint::of(instrument, dimension) }
     }
 
-    /// Mean of f·cosθo times the share of the beam, all channels, with everything off by `pose`.
-    fn flux(&self, (wi, wo): (DVec3, DVec3), pose: &Pose, f: &Truth<'_>, width: usize) -> Vec<f64> {
+    /// f·cosθo times the share of the beam, all channels, with everything off by `pose`.
+    pub fn flux(&self, (wi, wo): (DVec3, DVec3), pose: &Pose, f: &Truth<'_>, width: usize) -> Vec<f64> {
         let [theta_i, phi_i, theta_o, phi_o] = pose.zeros;
         let turn = frame(pose.tilt);
         let from_spot = |w: DVec3, theta: f64, phi: f64, distance: f64| {
@@ -91,19 +98,22 @@ impl<'a> Optics<'a> {
         };
         let (wi, near_i) = from_spot(wi, theta_i, phi_i, self.instrument.source.distance_m);
         let (wo, near_o) = from_spot(wo, theta_o, phi_o, self.instrument.detector.distance_m);
-        let share = near_i * near_o * self.footprint.map_or(1.0, |f| f.share(wi, wo));
-        let (mut own, mut out) = (vec![0.0; width], vec![0.0; width]);
-        let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
-            if wi.z > 0.0 && wo.z > 0.0 && f(wi, wo, &mut own) {
-                out.iter_mut().zip(&own).for_each(|(to, f)| *to += weight * wo.z * f);
-            }
-        };
-        self.cones.mean(wi, wo, &mut add, &mut out);
-        out.iter_mut().for_each(|out| *out *= share);
+        let mut out = vec![0.0; width];
+        if wi.z > 0.0 && wo.z > 0.0 && f(wi, wo, &mut out) {
+            let factor = wo.z * near_i * near_o * self.footprint.map_or(1.0, |f| f.share(wi, wo));
+            out.iter_mut().for_each(|out| *out *= factor);
+        } else {
+            out.fill(0.0);
+        }
         out
     }
 
-    /// u and q of every error: half the difference and the rest of the average, channel by channel.
+    /// BRDF over flux.
+    pub fn scale(&self, (wi, wo): (DVec3, DVec3)) -> f64 {
+        1.0 / (wo.z * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
+    }
+
+    /// u and q of every error: half the difference and the rest of the average, channel by channel, and the flux in the middle.
     fn moved(
         &self,
         pair: (DVec3, DVec3),
@@ -144,7 +154,29 @@ pub(super) fn of_reference(instrument: &Instrument, dimension: Dimension) -> f64
     list.iter().map(|(u, q)| u * u + 3.0 * q * q).sum::<f64>().sqrt()
 }
 
-/// Adds what errors of positions do to every reading.
+/// What every error does to one reading of one channel, 1/sr: u and q; and the variance of all together where squares matter.
+struct Effect {
+    parts: Vec<(f64, f64)>,
+    whole: Option<f64>,
+}
+
+impl Effect {
+    fn variances(&self) -> (f64, f64) {
+        self.parts.iter().fold((0.0, 0.0), |(linear, bent), (u, q)| (linear + u * u, bent + 3.0 * q * q))
+    }
+
+    /// Factors of all u² and all 3 q², so that they add up to the whole.
+    fn factors(&self) -> (f64, f64) {
+        let (linear, bent) = self.variances();
+        match self.whole {
+            Some(whole) if whole < linear => (whole / linear, 0.0),
+            Some(whole) if bent > 0.0 => (1.0, (whole - linear) / bent),
+            _ => (1.0, 1.0),
+        }
+    }
+}
+
+/// Adds what errors of positions do to every reading. `model` is what is read, about.
 pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: &Table, shared: &mut Shared<'_>) {
     let errors = errors(instrument, raw.dimension);
     if errors.is_empty() {
@@ -153,32 +185,60 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
     let (n, width) = (raw.directions.len(), raw.channels.len());
     let optics = Optics::new(instrument, raw.dimension);
     let reference = optics.of_reference(&errors);
-    let is_valid = |entry: &usize| (0..width).any(|c| table.values[c * n + entry].is_finite());
-    let valid: Vec<usize> = (0..n).filter(is_valid).collect();
-    let moved: Vec<_> =
-        valid.par_iter().map(|&e| optics.moved(raw.directions.pair(e), &errors, model, width).1).collect();
-    for (&entry, list) in valid.iter().zip(&moved) {
-        let (wi, wo) = raw.directions.pair(entry);
-        let scale = 1.0 / (wo.z * optics.footprint.map_or(1.0, |f| f.share(wi, wo)));
-        for (k, ((family, _, _), of)) in errors.iter().zip(list).enumerate() {
-            for (c, (u, q)) in of.iter().enumerate() {
-                let place = c * n + entry;
-                let value = table.values[place];
-                if !value.is_finite() {
-                    continue;
-                }
-                let (shift, bend) = if *family == JITTER {
-                    (scale * u, scale * q)
-                } else {
-                    (scale * u - value * reference[k].0, scale * q - value * reference[k].1)
-                };
-                if *family == JITTER {
-                    shared.add_own(*family, place, shift * shift + 3.0 * bend * bend);
-                } else {
-                    shared.add(*family, (k, 0), place, shift);
-                    shared.add_own(*family, place, 3.0 * bend * bend);
-                }
+    let values = |entry: usize| -> Vec<f64> { (0..width).map(|c| table.values[c * n + entry]).collect() };
+    let valid: Vec<usize> = (0..n).filter(|e| values(*e).iter().any(|v| v.is_finite())).collect();
+    let of = |entry: &usize| effects(&optics, raw.directions.pair(*entry), &errors, &reference, model, &values(*entry));
+    let effects: Vec<Vec<Effect>> = valid.par_iter().map(of).collect();
+    for (&entry, list) in valid.iter().zip(&effects) {
+        for (c, effect) in list.iter().enumerate() {
+            if table.values[c * n + entry].is_finite() {
+                place(effect, &errors, c * n + entry, shared);
             }
         }
+    }
+}
+
+/// The effects on one reading, channel by channel.
+fn effects(
+    optics: &Optics<'_>,
+    pair: (DVec3, DVec3),
+    errors: &[Off],
+    reference: &[(f64, f64)],
+    model: &Truth<'_>,
+    values: &[f64],
+) -> Vec<Effect> {
+    let scale = optics.scale(pair);
+    let (_, list) = optics.moved(pair, errors, model, values.len());
+    // Where the axes stop at the reference is noise of its visit.
+    let at_reference = |k: usize| if errors[k].0 == JITTER { (0.0, 0.0) } else { reference[k] };
+    let part = |c: usize, value: f64, k: usize| {
+        let ((u, q), (of_u, of_q)) = (list[k][c], at_reference(k));
+        (scale * u - value * of_u, scale * q - value * of_q)
+    };
+    let parts = |(c, value): (usize, &f64)| (0..errors.len()).map(|k| part(c, *value, k)).collect();
+    let mut effects: Vec<Effect> =
+        values.iter().enumerate().map(|of| Effect { parts: parts(of), whole: None }).collect();
+    let is_bent = |e: &Effect| {
+        let (linear, bent) = e.variances();
+        bent > BENT * linear
+    };
+    if effects.iter().any(is_bent) {
+        let relative: Vec<f64> = (0..errors.len()).map(|k| at_reference(k).0).collect();
+        let whole = spread::variances(optics, pair, errors, &relative, model, values);
+        effects.iter_mut().zip(whole).filter(|(e, _)| is_bent(e)).for_each(|(e, v)| e.whole = Some(v));
+    }
+    effects
+}
+
+/// Puts an effect where it belongs: shared errors into components, the rest into the reading's own.
+fn place(effect: &Effect, errors: &[Off], place: usize, shared: &mut Shared<'_>) {
+    let (of_linear, of_bent) = effect.factors();
+    for (k, ((family, _, _), (u, q))) in errors.iter().zip(&effect.parts).enumerate() {
+        if *family == JITTER {
+            shared.add_own(*family, place, of_linear * u * u);
+        } else {
+            shared.add(*family, (k, 0), place, of_linear.sqrt() * u);
+        }
+        shared.add_own(*family, place, of_bent * 3.0 * q * q);
     }
 }

@@ -1,9 +1,14 @@
 //! Readings of one thing at one stop of the axes, put together.
 
+use std::f64::consts::TAU;
+
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::reading::{Kind, Reading};
+
+/// Terms of the series of what rounding leaves in common.
+const HARMONICS: i32 = 20;
 
 /// A rate and its variance, from repeats of one exposure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +82,22 @@ fn limit(instrument: &Instrument) -> f64 {
 fn rate(signals: &[f64], exposure: f64, instrument: &Instrument) -> Rate {
     let count = signals.len() as f64;
     let signal = signals.iter().sum::<f64>() / count;
-    let rounding = step(&instrument.detector).powi(2) / 12.0;
-    let single = if instrument.is_noisy() { signal.max(1.0) + instrument.read_noise.powi(2) + rounding } else { 0.0 };
-    Rate { mean: signal / exposure, variance: single / (count * exposure * exposure), signal }
+    let noise = if instrument.is_noisy() { signal.max(1.0) + instrument.read_noise.powi(2) } else { 0.0 };
+    let variance = noise / count + rounding(noise, count, step(&instrument.detector));
+    Rate { mean: signal / exposure, variance: variance / (exposure * exposure), signal }
+}
+
+/// Variance of the mean of `count` readings by their rounding to steps: of step²/12 the share that repeats have in common does not average out.
+/// With normal noise of σ it is step² Σ exp(−(2πkσ/step)²)/(2π²k²), all of it without noise and 3e-5 of it at a σ of half a step.
+fn rounding(noise: f64, count: f64, step: f64) -> f64 {
+    if step == 0.0 {
+        return 0.0;
+    }
+    let term = |k: i32| {
+        let turn = TAU * f64::from(k);
+        2.0 * (-turn * turn * noise / (step * step)).exp() / (turn * turn)
+    };
+    let whole = step * step / 12.0;
+    let common = (step * step * (1..=HARMONICS).map(term).sum::<f64>()).min(whole);
+    common + (whole - common) / count
 }

@@ -1,0 +1,70 @@
+//! How often the 95 % intervals of reduced readings, and of parameters fitted to them, hold the truth over redrawn instruments, their own errors
+//! drawn too: `cargo bench --bench instrument_coverage` prints a Markdown table and exits with 1 where a mean leaves 93 to 97 %;
+//! `-- --quick` redraws a tenth, `-- NAME` only the built-in instrument NAME.
+#![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
+
+use std::time::Instant;
+
+#[allow(dead_code)] // tests use the rest
+#[path = "../tests/instrument/experiment.rs"]
+mod experiment;
+
+use experiment::{CLASSES, Experiment, coverage};
+use goniofit::geometry::angles::theta_of;
+use goniofit::gonio::PRESETS;
+
+const INSTRUMENTS: u64 = 2000;
+/// Fits through an instrument tabulate each lobe that they try: fewer of them.
+const THROUGH: u64 = 100;
+
+fn main() {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let count = if args.iter().any(|a| a == "--quick") { INSTRUMENTS / 10 } else { INSTRUMENTS };
+    let asked = |name: &str| args.iter().all(|a| a.starts_with("--") || a == name);
+    let clock = Instant::now();
+    println!(
+        "Intervals that hold the truth, {count} redrawn instruments a row ({THROUGH} for fits through the instrument):\n"
+    );
+    println!(
+        "| instrument | material | readings | held, mean | least | most | quantiles of errors over intervals | kd, ks, n at face value | kd, ks, n through |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let mut fine = true;
+    for preset in PRESETS.iter().filter(|p| p.name != "ideal" && asked(p.name)) {
+        for (class, truth) in CLASSES {
+            let of = Experiment::new(preset.name, truth);
+            let all = coverage(&of, 0..count, false);
+            fine &= (0.93..=0.97).contains(&all.mean);
+            let through = coverage(&of, 0..THROUGH, true);
+            let at = |(share, i): (f64, usize)| {
+                let (wi, wo) = of.directions.pair(i);
+                let sign = if wo.x <= 0.0 { 1.0 } else { -1.0 };
+                format!(
+                    "{:.1} % ({:.0}°, {:.1}°)",
+                    100.0 * share,
+                    theta_of(wi).to_degrees(),
+                    sign * theta_of(wo).to_degrees()
+                )
+            };
+            let three =
+                |p: [Option<f64>; 3]| p.map(|s| s.map_or("–".into(), |s| format!("{:.1}", 100.0 * s))).join(", ");
+            println!(
+                "| {} | {class} | {} | {:.1} % | {} | {} | {:.2} to {:.2} | {} | {} |",
+                preset.name,
+                all.readings,
+                100.0 * all.mean,
+                at(all.least),
+                at(all.most),
+                all.quantiles.0,
+                all.quantiles.1,
+                three(all.parameters),
+                three(through.parameters)
+            );
+        }
+    }
+    println!("\n{:.0} s on {} threads.", clock.elapsed().as_secs_f64(), rayon::current_num_threads());
+    if !fine {
+        eprintln!("a mean leaves 93 to 97 %");
+        std::process::exit(1);
+    }
+}

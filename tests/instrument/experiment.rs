@@ -1,0 +1,223 @@
+//! Redrawn instruments: what share of their readings' intervals, and of those of parameters fitted to the readings, hold the truth.
+//! `benches/instrument_coverage.rs` runs the same ones in numbers.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use goniofit::brdf::{LobeKind, Material, PerChannel, Sight};
+use goniofit::chain;
+use goniofit::control::Control;
+use goniofit::fit::{FitOptions, fit};
+use goniofit::geometry::angles::direction_deg;
+use goniofit::gonio::parts::{Detector, Source};
+use goniofit::gonio::sight::Cones;
+use goniofit::gonio::{ACCURACY, Instrument, Job, Preset, Raw, SimulationSpec};
+use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
+use goniofit::numeric::stats::normal_quantile;
+use rayon::prelude::*;
+
+/// kd, ks and n of the classes of materials; a matte one has no lobe.
+pub const CLASSES: [(&str, [f64; 3]); 3] =
+    [("matte", [0.8, 0.0, 1.0]), ("glossy", [0.2, 0.1, 60.0]), ("mirror-like", [0.05, 0.5, 2e4])];
+
+/// A material on the holder of an instrument.
+pub struct Experiment {
+    /// With cones: what a user describes.
+    pub described: Instrument,
+    /// The same without cones: readings of what its cones make of the material are those of the described one.
+    pub bare: Instrument,
+    pub truth: [f64; 3],
+    pub directions: Directions,
+    seen: Seen,
+}
+
+/// A material averaged over the cones of source and aperture, weighed by cosθo.
+struct Seen {
+    material: Material,
+    cones: Option<Arc<Cones>>,
+}
+
+impl Seen {
+    fn value(&self, wi: DVec3, wo: DVec3) -> f64 {
+        let Some((cones, place)) = self.cones.as_ref().and_then(|c| c.place(wi, wo).map(|place| (c, place))) else {
+            return self.material.value(wi, wo)[0];
+        };
+        let of = |lobe: &goniofit::brdf::LobeTerm| {
+            let (mut value, mut slope) = ([0.0], [vec![0.0]]);
+            let shape = lobe.shape_of(0).unwrap_or_default();
+            let slopes = if shape.is_empty() { &mut slope[..0] } else { &mut slope[..] };
+            cones.fill(lobe.kind, &shape, &[place], &mut value, slopes);
+            lobe.weight[0] * value[0]
+        };
+        self.material.lobes.iter().map(of).sum()
+    }
+}
+
+/// What one redrawn instrument's intervals hold.
+pub struct Outcome {
+    /// Reading by reading: error and σ; nothing where it is masked.
+    pub readings: Vec<Option<(f64, f64)>>,
+    /// Whether the intervals of kd, ks and n hold them; `None` where there is none.
+    pub parameters: [Option<bool>; 3],
+}
+
+impl Experiment {
+    pub fn new(preset: &str, truth: [f64; 3]) -> Self {
+        let spec: SimulationSpec = Preset::find(preset).expect("built in").spec().expect("reads");
+        let described = spec.instrument;
+        let bare = Instrument {
+            source: Source { divergence_deg: 0.0, ..described.source },
+            detector: Detector { aperture_deg: 0.0, ..described.detector.clone() },
+            ..described.clone()
+        };
+        let [kd, ks, n] = truth;
+        let mut lobes = vec![(LobeKind::Lambert, vec![kd], vec![])];
+        if ks > 0.0 {
+            lobes.push((LobeKind::Phong, vec![ks], vec![n]));
+        }
+        let material = Material::new(vec!["y".into()], lobes);
+        let directions = scan(width(&described, truth));
+        let seen = Seen { material, cones: Cones::of(&described).map(Arc::new) };
+        Self { described, bare, truth, directions, seen }
+    }
+
+    /// What each reading stands for.
+    pub fn expected(&self, i: usize) -> f64 {
+        let (wi, wo) = self.directions.pair(i);
+        self.seen.value(wi, wo)
+    }
+
+    /// Raw readings of the instrument of this seed.
+    pub fn raw(&self, seed: u64) -> Raw {
+        self.with_job(&self.bare, seed, |job| job.run(Control::silent()))
+    }
+
+    /// What `work` makes of the job of an instrument without cones.
+    pub fn with_job<T>(&self, instrument: &Instrument, seed: u64, work: impl FnOnce(&Job<'_>) -> T) -> T {
+        let truth = |wi: DVec3, wo: DVec3, out: &mut [f64]| {
+            out[0] = self.seen.value(wi, wo);
+            true
+        };
+        work(&Job {
+            truth: &truth,
+            channels: &self.seen.material.channels,
+            instrument,
+            dimension: Dimension::Space,
+            directions: &self.directions,
+            weights: &Weights::Uniform,
+            seed,
+            accuracy: ACCURACY,
+            left_out: &[],
+        })
+    }
+
+    pub fn outcome(&self, seed: u64, through: bool) -> Outcome {
+        let m = chain::reduced("study", &self.raw(seed), &self.bare).expect("reduced").measurement;
+        let readings = (0..m.len()).map(|i| Some((m.value(0, i)? - self.expected(i), sigma(&m, i)))).collect();
+        Outcome { readings, parameters: self.parameters(&m, through) }
+    }
+
+    /// A fit with the σ that the measurement states, at face value or through the instrument.
+    fn parameters(&self, m: &Measurement, through: bool) -> [Option<bool>; 3] {
+        let matte = self.truth[1] == 0.0;
+        let model = if matte { "lambert" } else { "lambert+phong" };
+        let sight = self.seen.cones.clone().filter(|_| through).map(|cones| cones as Arc<dyn Sight>);
+        let plain = FitOptions::new(model.parse().expect("a model"));
+        let options = FitOptions { use_sigma: true, through: sight, ..plain };
+        let material = fit(m, &options).expect("fits").material;
+        let record = material.fit.as_ref().expect("a record");
+        let holds = |interval: Option<(f64, f64)>, truth: f64| interval.map(|(a, b)| a <= truth && truth <= b);
+        let kd = holds(record.interval_95[0].weight[0], self.truth[0]);
+        if matte {
+            return [kd, None, None];
+        }
+        let lobe = &record.interval_95[1];
+        let PerChannel::Shared(exponent) = &lobe.shape[0].1 else { panic!("one exponent") };
+        [kd, holds(lobe.weight[0], self.truth[1]), holds(*exponent, self.truth[2])]
+    }
+}
+
+/// Independent and shared errors of a reading together, one σ.
+pub fn sigma(m: &Measurement, i: usize) -> f64 {
+    let own = m.sigma.as_ref().map_or(0.0, |s| s[i]);
+    (own * own + m.common.iter().map(|k| k[i] * k[i]).sum::<f64>()).sqrt()
+}
+
+/// Standard deviation of a lobe as it is seen, degrees: its own and, along one axis, half the half angles of the cones.
+fn width(instrument: &Instrument, [_, ks, n]: [f64; 3]) -> f64 {
+    let cones = [instrument.source.divergence_deg, instrument.detector.aperture_deg].map(|full| (0.25 * full).powi(2));
+    let own = if ks > 0.0 { n.sqrt().recip().to_degrees() } else { 10.0 };
+    (own * own + cones.iter().sum::<f64>()).sqrt()
+}
+
+/// In the plane of incidence at 20° and 45°: about the mirror direction at shares of the lobe's width, and coarsely elsewhere.
+fn scan(width_deg: f64) -> Directions {
+    let (mut wi, mut wo) = (Vec::new(), Vec::new());
+    for theta in [20.0, 45.0] {
+        let near = [0.0, 0.3, 0.6, 1.0, 1.4, 1.8, 2.3, 2.8, 3.5].into_iter();
+        let about = near
+            .flat_map(|k: f64| if k == 0.0 { vec![theta] } else { vec![theta - k * width_deg, theta + k * width_deg] });
+        let rest = [-65.0, -50.0, -35.0, 0.0, 10.0, 30.0, 60.0, 70.0];
+        for theta_o in about.chain(rest).filter(|t| t.abs() <= 75.0) {
+            wi.push(direction_deg(theta, 0.0));
+            wo.push(direction_deg(theta_o, 180.0));
+        }
+    }
+    Directions::List { wi, wo }
+}
+
+/// How often intervals hold.
+pub struct Coverage {
+    /// Over all readings that were valid in more than half of the instruments.
+    pub mean: f64,
+    /// Of the reading that holds least often, of the one that does most often, and their index.
+    pub least: (f64, usize),
+    pub most: (f64, usize),
+    /// Width between the 2.5 % and 97.5 % quantiles of the errors, over that of the mean interval: least and most of the readings.
+    pub quantiles: (f64, f64),
+    /// Of kd, ks and n.
+    pub parameters: [Option<f64>; 3],
+    pub readings: usize,
+}
+
+/// Redraws instruments of these seeds; parameters of the first `fits`.
+pub fn coverage(of: &Experiment, seeds: std::ops::Range<u64>, through: bool) -> Coverage {
+    let runs: Vec<Outcome> = seeds.into_par_iter().map(|seed| of.outcome(seed, through)).collect();
+    let k = normal_quantile(0.975);
+    let list: Vec<(f64, f64, usize)> = (0..of.directions.len())
+        .filter_map(|i| {
+            let valid: Vec<(f64, f64)> = runs.iter().filter_map(|run| run.readings[i]).collect();
+            (valid.len() * 2 > runs.len()).then(|| {
+                let held = valid.iter().filter(|(error, sigma)| error.abs() <= k * sigma).count();
+                (held as f64 / valid.len() as f64, spread(&valid, k), i)
+            })
+        })
+        .collect();
+    let by = |pick: fn(f64, f64) -> bool| {
+        list.iter().fold(None, |best: Option<(f64, usize)>, (share, _, i)| match best {
+            Some((found, _)) if !pick(*share, found) => best,
+            _ => Some((*share, *i)),
+        })
+    };
+    let parameter = |p: usize| {
+        let known: Vec<bool> = runs.iter().filter_map(|run| run.parameters[p]).collect();
+        (!known.is_empty()).then(|| known.iter().filter(|held| **held).count() as f64 / known.len() as f64)
+    };
+    Coverage {
+        mean: list.iter().map(|l| l.0).sum::<f64>() / list.len() as f64,
+        least: by(|a, b| a < b).expect("readings"),
+        most: by(|a, b| a > b).expect("readings"),
+        quantiles: list.iter().fold((f64::INFINITY, 0.0), |(low, high), l| (l.1.min(low), l.1.max(high))),
+        parameters: [0, 1, 2].map(parameter),
+        readings: list.len(),
+    }
+}
+
+/// The central 95 % of the errors over the mean interval.
+fn spread(valid: &[(f64, f64)], k: f64) -> f64 {
+    let mut errors: Vec<f64> = valid.iter().map(|v| v.0).collect();
+    errors.sort_by(f64::total_cmp);
+    let at = |p: f64| errors[((p * errors.len() as f64) as usize).min(errors.len() - 1)];
+    let mean = valid.iter().map(|v| v.1).sum::<f64>() / valid.len() as f64;
+    (at(0.975) - at(0.025)) / (2.0 * k * mean)
+}
