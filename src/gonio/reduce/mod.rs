@@ -2,7 +2,7 @@
 //!
 //! Per reading f = (s − b)/(r − b) · f_ref cosθref share_ref/(cosθo share), all of them rates: s the sample's, b the blank's (else the dark's), r the
 //! reference's, b and r interpolated between the visits before and after. Without a reference the gain is taken as stated. What is
-//! measured is f averaged over the cones of source and aperture, weighed by cosθo.
+//! measured is f averaged over the cones of source and aperture, weighed by cosθo: ⟨f cosθo⟩/⟨cosθo⟩.
 
 mod budget;
 pub(super) mod positions;
@@ -80,6 +80,8 @@ pub fn reduce(
 /// What turns a net rate into a BRDF.
 struct Scale {
     footprint: Option<Footprint>,
+    /// The mean of cosθo over the aperture, over its value in the middle.
+    mean_cos: f64,
     /// f_ref cosθref share_ref; where there is no reference, 1 over the gain.
     reference: f64,
 }
@@ -90,17 +92,22 @@ impl Scale {
         let (wi, wo) = reference_pair(&instrument.reference);
         let share = footprint.map_or(1.0, |f| f.share(wi, wo));
         let standard = Standard::new(&instrument.reference, 0.0, dimension);
-        let of_standard = standard.value(wi, wo) * wo.z * mean_cos(instrument, dimension) * share;
-        Self { footprint, reference: if instrument.has_reference() { of_standard } else { 1.0 / instrument.gain() } }
+        let mean_cos = mean_cos(instrument, dimension);
+        let of_standard = standard.value(wi, wo) * wo.z * mean_cos * share;
+        Self {
+            footprint,
+            mean_cos,
+            reference: if instrument.has_reference() { of_standard } else { 1.0 / instrument.gain() },
+        }
     }
 
     /// BRDF over (net rate / reference's net rate), or over the net rate.
     fn of(&self, wi: DVec3, wo: DVec3) -> f64 {
-        self.reference / (wo.z * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
+        self.reference / (wo.z * self.mean_cos * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
     }
 }
 
-/// The mean of cosθo over the aperture, over its value in the middle: what the aperture takes from a diffuse standard.
+/// The mean of cosθo over the aperture, over its value in the middle.
 fn mean_cos(instrument: &Instrument, dimension: Dimension) -> f64 {
     let half = 0.5 * instrument.detector.aperture_deg.to_radians();
     match dimension {

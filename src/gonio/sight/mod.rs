@@ -1,6 +1,7 @@
 //! Lobes as an instrument sees them: averaged over the cones of its source and its aperture.
 //!
-//! A reduced reading is ⟨f cosθo⟩/cosθo, the mean over both cones ([`super::effects`]). Of a Phong lobe that depends on two numbers besides the
+//! A reduced reading is ⟨f cosθo⟩/⟨cosθo⟩, means over both cones ([`super::effects`]); ⟨cosθo⟩ = cosθo (1 + cos a)/2 for an aperture of half
+//! angle a, and a Lambert lobe is read as it is. Of a Phong lobe that depends on two numbers besides the
 //! exponent: the angle α between the mirror direction r and wo, and q = cosθi/cosθo. For the mean of cosⁿ∠(r′, w′) w′ over r′ about r and w′
 //! about wo lies in the plane of both, U(α) wo + W(α) r, and its z component over cosθo is U + q W. U and W with their derivatives by n are
 //! tabulated once for each n; then a sample costs an interpolation, whatever the cones.
@@ -146,17 +147,18 @@ impl Sight for Cones {
         derivatives: &mut [Vec<f64>],
     ) {
         let (&[n], Some(slopes)) = (shape, derivatives.first_mut()) else {
-            // ⟨cosθo⟩/cosθo over the aperture is (1 + cos a)/2.
-            values.fill(kind.lobe().value(&[], 0.0, &mut []) * (0.5 * self.detector.half).cos().powi(2));
+            values.fill(kind.lobe().value(&[], 0.0, &mut []));
             return;
         };
+        // (1 + cos a)/2.
+        let scale = 1.0 / (TAU * (0.5 * self.detector.half).cos().powi(2));
         let slot = self.seen(n);
         let seen = slot.get_or_init(|| self.table(n));
         for (i, [alpha, q]) in places.iter().enumerate() {
             let [u, w, du, dw] = seen.at(*alpha);
             let (value, slope) = (u + q * w, du + q * dw);
-            values[i] = (n + 2.0) / TAU * value;
-            slopes[i] = ((n + 2.0) * slope + value) / TAU;
+            values[i] = (n + 2.0) * scale * value;
+            slopes[i] = ((n + 2.0) * slope + value) * scale;
         }
     }
 }
