@@ -25,7 +25,7 @@ use support::{material, read, reduced};
 const EXPONENTS: [f64; 5] = [10.0, 1e2, 1e3, 1e4, 1e5];
 const APERTURES_DEG: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
 /// Instruments of each cell.
-const DRAWS: u64 = 200;
+const DRAWS: u64 = 100;
 /// Photoelectrons a second of 1/sr: a usual light, and one so weak that an aperture may hide the lobe's width.
 const ELECTRONS: [f64; 2] = [1e5, 30.0];
 
@@ -62,11 +62,18 @@ fn scan(n: f64, aperture_deg: f64) -> (Directions, Weights) {
     (Directions::List { wi, wo }, Weights::Uniform)
 }
 
+/// An instrument, and what is seen through it.
+struct Through {
+    instrument: Instrument,
+    cones: Arc<Cones>,
+}
+
 /// The plain fit and the one through the instrument, of one simulated measurement.
-fn both(truth: &Material, n: f64, instrument: &Instrument, scan: &(Directions, Weights), seed: u64) -> [Found; 2] {
+fn both(truth: &Material, n: f64, through: &Through, scan: &(Directions, Weights), seed: u64) -> [Found; 2] {
+    let Through { instrument, cones } = through;
     let readings = reduced(&read(truth, instrument, scan, seed), instrument, truth).measurement;
     let plain = FitOptions { use_sigma: true, ..FitOptions::new("lambert+phong".parse().expect("a model")) };
-    let through = FitOptions { through: Some(Arc::new(Cones::of(instrument).expect("an aperture"))), ..plain.clone() };
+    let through = FitOptions { through: Some(cones.clone()), ..plain.clone() };
     [plain, through].map(|options| {
         let found = fit(&readings, &options).expect("fits").material;
         let record = found.fit.as_ref().expect("a record");
@@ -94,9 +101,10 @@ struct Cell {
 fn cell(n: f64, aperture_deg: f64, electrons: f64) -> Cell {
     let instrument =
         Instrument { electrons, detector: Detector { aperture_deg, ..Detector::default() }, ..Instrument::default() };
+    let through = Through { cones: Arc::new(Cones::of(&instrument).expect("an aperture")), instrument };
     let (truth, scan) = (material(0.2, 0.1, n), scan(n, aperture_deg));
     let found: Vec<[Found; 2]> =
-        (0..DRAWS).into_par_iter().map(|seed| both(&truth, n, &instrument, &scan, seed)).collect();
+        (0..DRAWS).into_par_iter().map(|seed| both(&truth, n, &through, &scan, seed)).collect();
     let determined: Vec<&[Found; 2]> = found.iter().filter(|f| f[1].error.is_some()).collect();
     let count = determined.len().max(1) as f64;
     // Exponents are compared on the scale on which they are searched.

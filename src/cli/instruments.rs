@@ -23,7 +23,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let Some(name) = &args.name else { return list(ui) };
     let preset = Preset::find(name).ok_or_else(|| unknown(name))?;
     let (spec, description) = read(preset)?;
-    let effects = plan(&spec.instrument);
+    let effects = plan(&spec.instrument, &[]);
     let on: Vec<&str> = effects.effects.iter().filter(|e| e.on).map(|e| e.name).collect();
     let said = if on.is_empty() { "none".into() } else { on.join(", ") };
     let text = if args.toml { preset.toml.to_owned() } else { format!("{name}: {description}\n  effects: {said}") };

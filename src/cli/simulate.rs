@@ -80,7 +80,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     write_measurement(&table, &args.out, format, ui)?;
     let valid = table.values.len() as u64 - table.masked.total();
     if args.out.as_os_str() != "-" {
-        let effects = gonio::plan(&plan.instrument);
+        let effects = gonio::plan(&plan.instrument, &table.channels);
         let on: Vec<&str> = effects.effects.iter().filter(|e| e.on).map(|e| e.name).collect();
         let text = format!(
             "{}: {} direction pairs, {valid} valid values, scan {}, seed {}; effects: {}",

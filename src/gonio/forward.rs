@@ -57,8 +57,9 @@ impl Job<'_> {
     /// Reads everything by an instrument with the errors `actual`.
     #[must_use]
     pub fn read(&self, readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
-        let Self { truth, instrument, seed, accuracy, dimension, .. } = *self;
-        let passes = effects::passes(&Maker { instrument, dimension, actual, truth, seed, accuracy }, self.left_out);
+        let Self { truth, channels, instrument, seed, accuracy, dimension, .. } = *self;
+        let passes =
+            effects::passes(&Maker { instrument, dimension, channels, actual, truth, seed, accuracy }, self.left_out);
         let (n, width) = (readings.len(), self.channels.len());
         control.progress.start("reading", n as u64);
         let blocks: Vec<(Vec<f64>, f64)> = (0..n.div_ceil(BLOCK))

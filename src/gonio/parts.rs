@@ -17,13 +17,15 @@ pub struct Source {
     pub beam_diameter_m: f64,
     /// Distance at which irradiance falls as 1/r², m; 0 is a collimated beam, which does not.
     pub distance_m: f64,
+    /// Full width at half maximum of the triangular band of wavelengths that is lit and read, nm; matters where channels are wavelengths.
+    pub bandwidth_nm: f64,
     /// Random walk of the power, relative standard deviation after an hour.
     pub drift_per_sqrt_hour: f64,
 }
 
 impl Default for Source {
     fn default() -> Self {
-        Self { divergence_deg: 0.0, beam_diameter_m: 0.0, distance_m: 0.0, drift_per_sqrt_hour: 0.0 }
+        Self { divergence_deg: 0.0, beam_diameter_m: 0.0, distance_m: 0.0, bandwidth_nm: 0.0, drift_per_sqrt_hour: 0.0 }
     }
 }
 
@@ -152,13 +154,14 @@ impl Source {
     /// What is wrong with the numbers, if anything.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
-        let Self { divergence_deg, beam_diameter_m, distance_m, drift_per_sqrt_hour } = *self;
+        let Self { divergence_deg, beam_diameter_m, distance_m, bandwidth_nm, drift_per_sqrt_hour } = *self;
         check(
             "source",
             &[
                 ("divergence_deg", divergence_deg, 60.0),
                 ("beam_diameter_m", beam_diameter_m, 100.0),
                 ("distance_m", distance_m, 1e6),
+                ("bandwidth_nm", bandwidth_nm, 1e4),
                 ("drift_per_sqrt_hour", drift_per_sqrt_hour, 1.0),
             ],
         )

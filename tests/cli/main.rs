@@ -18,3 +18,4 @@ mod real_files;
 mod scenes;
 mod streams;
 mod threads;
+mod through;

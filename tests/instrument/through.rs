@@ -46,6 +46,12 @@ fn about_the_mirror(width: f64) -> (Directions, Weights) {
     (Directions::List { wi, wo }, Weights::Uniform)
 }
 
+/// Every how many-th pair of a scan.
+fn thinned((directions, weights): (Directions, Weights), step: usize) -> (Directions, Weights) {
+    let (wi, wo) = (0..directions.len()).step_by(step).map(|i| directions.pair(i)).unzip();
+    (Directions::List { wi, wo }, weights)
+}
+
 /// What a lobe's kernel says is what the readings are: the same integral by another way.
 #[test]
 fn a_lobe_seen_through_the_instrument_is_what_it_reads() {
@@ -60,7 +66,9 @@ fn a_lobe_seen_through_the_instrument_is_what_it_reads() {
     ] {
         let instrument = wide(source, detector);
         let cones = Cones::of(&instrument).expect("cones");
-        let scan = about_the_mirror(f64::max(1.0 / f64::sqrt(n), 0.01));
+        // Sums over two cones take long: fewer pairs then.
+        let scan =
+            thinned(about_the_mirror(f64::max(1.0 / f64::sqrt(n), 0.01)), if source * detector > 0.0 { 9 } else { 1 });
         let material = Material::new(vec!["y".into()], vec![(LobeKind::Phong, vec![1.0], vec![n])]);
         let raw = read_nominal(&material, &instrument, &scan);
         let read = reduced(&raw, &instrument, &material).measurement;
@@ -95,7 +103,7 @@ fn a_lobe_seen_through_the_instrument_is_what_it_reads() {
 #[test]
 fn a_fit_through_the_instrument_finds_the_material() {
     for (source, detector, n) in
-        [(0.0, 1.0, 100.0), (0.0, 3.0, 1e3), (0.5, 1.0, 1e4), (1.0, 0.0, 300.0), (0.0, 0.5, 1e5)]
+        [(0.0, 1.0, 100.0), (0.0, 3.0, 1e3), (0.2, 1.0, 1e3), (1.0, 0.0, 300.0), (0.0, 0.5, 1e5)]
     {
         let (truth, instrument) = (material(0.2, 0.1, n), wide(source, detector));
         let scan = about_the_mirror(f64::max(1.0 / f64::sqrt(n), 0.01));

@@ -7,6 +7,6 @@ use super::{Entry, stated};
 
 pub(super) const EFFECT: Entry = Entry {
     name: "detector aperture",
-    calls: |i| stated(i.detector.aperture_deg, "detector.aperture_deg", "°"),
+    calls: |i, _| stated(i.detector.aperture_deg, "detector.aperture_deg", "°"),
     make: |_| None,
 };

@@ -4,7 +4,7 @@ use super::{Block, Entry, Maker, Pass};
 
 pub(super) const EFFECT: Entry = Entry {
     name: "dark current",
-    calls: |i| {
+    calls: |i, _| {
         let (mean, drift) = (i.detector.dark_per_s, i.detector.dark_drift_per_sqrt_hour);
         let said = format!("detector.dark_per_s = {mean}, dark_drift_per_sqrt_hour = {drift}");
         if i.has_dark() { Ok(said) } else { Err(said) }

@@ -6,6 +6,6 @@ use super::{Entry, stated};
 
 pub(super) const EFFECT: Entry = Entry {
     name: "source divergence",
-    calls: |i| stated(i.source.divergence_deg, "source.divergence_deg", "°"),
+    calls: |i, _| stated(i.source.divergence_deg, "source.divergence_deg", "°"),
     make: |_| None,
 };

@@ -15,7 +15,7 @@ use crate::measurement::Dimension;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "footprint",
-    calls: |i| match cut_by(i) {
+    calls: |i, _| match cut_by(i) {
         "" => {
             Err("nothing cuts the beam (source.beam_diameter_m, sample.diameter_m, detector.field_diameter_m)".into())
         }

@@ -10,7 +10,7 @@ use crate::measurement::Dimension;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "sample height",
-    calls: |i| {
+    calls: |i, _| {
         let seen = i.detector.distance_m > 0.0 || i.source.distance_m > 0.0;
         stated(i.sample.height_u_m, "sample.height_u_m", " m")
             .and_then(|why| if seen { Ok(why) } else { Err("source and detector are far away".into()) })

@@ -9,7 +9,7 @@ use crate::numeric::random::{Purpose, stream};
 
 pub(super) const EFFECT: Entry = Entry {
     name: "axis jitter",
-    calls: |i| stated(i.axes.jitter_deg, "axes.jitter_deg", "°"),
+    calls: |i, _| stated(i.axes.jitter_deg, "axes.jitter_deg", "°"),
     make: |maker: &Maker<'_>| {
         let sigma = maker.instrument.axes.jitter_deg.to_radians();
         Some(Box::new(Jitter { seed: maker.seed, sigma, is_flat: maker.dimension == Dimension::Flat }))

@@ -4,6 +4,7 @@
 //! the instrument calls for it; what is off is not among the passes, so that it costs nothing and changes no bit.
 
 mod aperture;
+mod band;
 pub(super) mod cone;
 mod dark;
 mod divergence;
@@ -74,6 +75,7 @@ pub(super) trait Pass: Sync {
 pub(super) struct Maker<'a> {
     pub instrument: &'a Instrument,
     pub dimension: Dimension,
+    pub channels: &'a [String],
     pub actual: &'a Actual,
     pub truth: &'a Truth<'a>,
     pub seed: u64,
@@ -81,11 +83,11 @@ pub(super) struct Maker<'a> {
     pub accuracy: f64,
 }
 
-/// The effect of a file: its name, and whether and why an instrument calls for it.
+/// The effect of a file: its name, and whether and why an instrument calls for it in these channels.
 struct Entry {
     name: &'static str,
     /// `Ok` with the reason for it, `Err` with that against it.
-    calls: fn(&Instrument) -> Result<String, String>,
+    calls: fn(&Instrument, &[String]) -> Result<String, String>,
     /// Its pass, where it has one of its own.
     make: for<'a> fn(&Maker<'a>) -> Option<Box<dyn Pass + 'a>>,
 }
@@ -94,7 +96,7 @@ struct Entry {
 const GEOMETRY: [Entry; 6] =
     [zero::EFFECT, jitter::EFFECT, tilt::EFFECT, height::EFFECT, divergence::EFFECT, aperture::EFFECT];
 /// Effects on the flux, electrons a second.
-const FLUX: [Entry; 5] = [footprint::EFFECT, shadow::EFFECT, stray::EFFECT, power::EFFECT, dark::EFFECT];
+const FLUX: [Entry; 6] = [band::EFFECT, footprint::EFFECT, shadow::EFFECT, stray::EFFECT, power::EFFECT, dark::EFFECT];
 /// Effects on the electrons of a reading.
 const DETECTOR: [Entry; 5] =
     [shot::EFFECT, saturation::EFFECT, nonlinearity::EFFECT, read_noise::EFFECT, quantisation::EFFECT];
@@ -103,12 +105,12 @@ fn effects() -> impl Iterator<Item = &'static Entry> {
     GEOMETRY.iter().chain(&FLUX).chain(&DETECTOR)
 }
 
-/// Which effects the instrument calls for, in the order in which they act, and why.
+/// Which effects the instrument calls for when it reads a material of these channels, in the order in which they act, and why.
 #[must_use]
-pub fn plan(instrument: &Instrument) -> Plan {
+pub fn plan(instrument: &Instrument, channels: &[String]) -> Plan {
     let mut plan = Plan::default();
     for effect in effects() {
-        match (effect.calls)(instrument) {
+        match (effect.calls)(instrument, channels) {
             Ok(why) => plan.push(effect.name, true, why),
             Err(why) => plan.push(effect.name, false, why),
         }
@@ -118,7 +120,7 @@ pub fn plan(instrument: &Instrument) -> Plan {
 
 /// The passes of those effects that are on, and not left out by name, among the two that every reading takes: the light and the exposure.
 pub(super) fn passes<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Vec<Box<dyn Pass + 'a>> {
-    let on = |e: &&Entry| (e.calls)(maker.instrument).is_ok() && !left_out.contains(&e.name);
+    let on = |e: &&Entry| (e.calls)(maker.instrument, maker.channels).is_ok() && !left_out.contains(&e.name);
     let of = |list: &'static [Entry]| list.iter().filter(on).filter_map(|e| (e.make)(maker)).collect::<Vec<_>>();
     let [geometry, flux, detector] = [of(&GEOMETRY), of(&FLUX), of(&DETECTOR)];
     let light: Box<dyn Pass + 'a> = light::pass(maker, left_out);

@@ -4,7 +4,7 @@ use super::{Block, Entry, Maker, Pass, stated};
 
 pub(super) const EFFECT: Entry = Entry {
     name: "source drift",
-    calls: |i| stated(i.source.drift_per_sqrt_hour, "source.drift_per_sqrt_hour", ""),
+    calls: |i, _| stated(i.source.drift_per_sqrt_hour, "source.drift_per_sqrt_hour", ""),
     make: |maker: &Maker<'_>| {
         let power = &maker.actual.power[..];
         (!power.is_empty()).then(|| Box::new(Power(power)) as Box<dyn Pass>)

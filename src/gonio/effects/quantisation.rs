@@ -7,7 +7,7 @@ use crate::gonio::parts::Detector;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "quantisation",
-    calls: |i| match i.detector.bits {
+    calls: |i, _| match i.detector.bits {
         0 => Err("detector.bits = 0".into()),
         bits => Ok(format!("detector.bits = {bits}: steps of {:.3} electrons", step(&i.detector))),
     },

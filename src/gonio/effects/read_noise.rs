@@ -5,7 +5,7 @@ use crate::gonio::instrument::normal;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "read noise",
-    calls: |i| match stated(i.read_noise, "read_noise", " electrons") {
+    calls: |i, _| match stated(i.read_noise, "read_noise", " electrons") {
         Ok(_) if !i.is_noisy() => Err("electrons = 0".into()),
         said => said,
     },

@@ -4,7 +4,7 @@ use super::{Block, Entry, Maker, Pass, stated};
 
 pub(super) const EFFECT: Entry = Entry {
     name: "saturation",
-    calls: |i| stated(i.detector.full_well, "detector.full_well", " electrons"),
+    calls: |i, _| stated(i.detector.full_well, "detector.full_well", " electrons"),
     make: |maker: &Maker<'_>| Some(Box::new(Saturation(maker.instrument.detector.full_well))),
 };
 

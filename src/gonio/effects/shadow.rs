@@ -9,7 +9,7 @@ use crate::gonio::reading::Kind;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "shadow",
-    calls: |i| stated(i.surroundings.shadow_deg, "surroundings.shadow_deg", "°"),
+    calls: |i, _| stated(i.surroundings.shadow_deg, "surroundings.shadow_deg", "°"),
     make: |maker: &Maker<'_>| Some(Box::new(Shadow(maker.instrument.surroundings.shadow_deg.to_radians()))),
 };
 

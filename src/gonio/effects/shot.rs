@@ -5,7 +5,7 @@ use crate::gonio::instrument::shot;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "shot noise",
-    calls: |i| if i.is_noisy() { Ok(format!("electrons = {}", i.electrons)) } else { Err("electrons = 0".into()) },
+    calls: |i, _| if i.is_noisy() { Ok(format!("electrons = {}", i.electrons)) } else { Err("electrons = 0".into()) },
     make: |maker: &Maker<'_>| Some(Box::new(Shot { seed: maker.seed })),
 };
 

@@ -5,7 +5,7 @@ use crate::gonio::reading::Kind;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "stray light",
-    calls: |i| stated(i.surroundings.stray_per_sr, "surroundings.stray_per_sr", " 1/sr"),
+    calls: |i, _| stated(i.surroundings.stray_per_sr, "surroundings.stray_per_sr", " 1/sr"),
     make: |maker: &Maker<'_>| {
         Some(Box::new(Stray(maker.instrument.gain() * maker.instrument.surroundings.stray_per_sr)))
     },

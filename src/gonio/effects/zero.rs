@@ -7,7 +7,7 @@ use crate::geometry::angles::turned;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "axis zeros",
-    calls: |i| stated(i.axes.zero_u_deg, "axes.zero_u_deg", "°"),
+    calls: |i, _| stated(i.axes.zero_u_deg, "axes.zero_u_deg", "°"),
     make: |maker: &Maker<'_>| Some(Box::new(Zeros(maker.actual.zeros))),
 };
 
