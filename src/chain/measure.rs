@@ -2,9 +2,9 @@
 
 use super::error::ChainError;
 use super::source::Source;
+use super::surrogate::Surrogate;
 use crate::brdf::{Brdf, Material};
 use crate::control::Control;
-use crate::fit::{FitOptions, fit};
 use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, reduce, simulate};
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
@@ -51,7 +51,8 @@ pub fn measure_raw(
     })
 }
 
-/// Reduces raw readings. Where errors of positions matter, a fit of `lambert+phong+phong` to a first reduction tells what they do.
+/// Reduces raw readings. Where errors of positions matter, a fit of `lambert+phong+phong` to a first reduction, through the
+/// instrument where that matters, tells what they do.
 ///
 /// # Errors
 /// [`ChainError::Reduce`].
@@ -61,21 +62,15 @@ pub fn reduced(name: &str, raw: &Raw, instrument: &Instrument) -> Result<Reducti
     if !instrument.has_positions() {
         return Ok(first);
     }
-    let model = SURROGATE.parse().ok().map(FitOptions::new);
-    match model.map(|options| fit(&first.measurement, &options)) {
-        Some(Ok(fitted)) => {
-            let model = |wi, wo, out: &mut [f64]| {
-                fitted.material.write_value(wi, wo, out);
-                true
-            };
-            reduce(name, raw, instrument, Some(&model)).map_err(wrong)
-        }
-        _ => Ok(first), // which says that there was no model
-    }
+    let Some(surrogate) = Surrogate::of(&first.measurement, instrument) else {
+        return Ok(first); // which says that there was no model
+    };
+    let model = |wi, wo, out: &mut [f64]| {
+        surrogate.write_value(wi, wo, out);
+        true
+    };
+    reduce(name, raw, instrument, Some(&model)).map_err(wrong)
 }
-
-/// The model whose slopes tell what errors of positions do.
-const SURROGATE: &str = "lambert+phong+phong";
 
 /// What `work` makes of the material's values and channels; `None` from it is a scan that is too large.
 fn with_truth<T>(

@@ -14,6 +14,7 @@ mod output;
 mod pictures;
 mod scatter;
 mod source;
+mod surrogate;
 
 pub use demo::{Demo, DemoFit, DemoOptions, demo};
 pub use error::ChainError;

@@ -1,7 +1,6 @@
 //! The budget against Monte Carlo (GUM Supplement 1): each line is the scatter of readings when its error alone is drawn.
 
 use crate::experiment::{CLASSES, Experiment};
-use goniofit::chain;
 use goniofit::control::Control;
 use goniofit::gonio::{Actual, Job, Reading, Reduction, reduce, series};
 use rayon::prelude::*;
@@ -49,7 +48,7 @@ fn scatter(of: &Experiment, draw: impl Fn(&[Reading], u64) -> Actual + Sync, lef
 /// 2,000 draws is known to 1.6 %, and the surrogate that slopes come from is fitted to noisy readings.
 fn check(name: &str) {
     let of = Experiment::new(name, CLASSES[1].1);
-    let reduction = chain::reduced("m", &of.raw(1), &of.bare).expect("reduced");
+    let reduction = of.reduced(1);
     let stated = |line: &str| {
         let k =
             reduction.budget.lines.iter().position(|l| l.name == line).unwrap_or_else(|| panic!("{line} of {name}"));
@@ -88,7 +87,7 @@ fn the_budget_of_a_commercial_instrument_is_what_monte_carlo_finds() {
 fn noise_is_what_monte_carlo_finds() {
     for name in ["standards-lab", "commercial", "classroom"] {
         let of = Experiment::new(name, CLASSES[1].1);
-        let reduction = chain::reduced("m", &of.raw(1), &of.bare).expect("reduced");
+        let reduction = of.reduced(1);
         let noise: Vec<usize> = (0..reduction.budget.lines.len() - 1)
             .filter(|k| reduction.budget.lines[*k].name.starts_with("noise"))
             .collect();

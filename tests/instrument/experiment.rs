@@ -11,7 +11,7 @@ use goniofit::fit::{FitOptions, fit};
 use goniofit::geometry::angles::direction_deg;
 use goniofit::gonio::parts::{Detector, Source};
 use goniofit::gonio::sight::Cones;
-use goniofit::gonio::{ACCURACY, Instrument, Job, Preset, Raw, SimulationSpec};
+use goniofit::gonio::{ACCURACY, Instrument, Job, Preset, Raw, Reduction, SimulationSpec};
 use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
 use goniofit::numeric::stats::normal_quantile;
 use rayon::prelude::*;
@@ -84,7 +84,13 @@ impl Experiment {
     /// What each reading stands for.
     pub fn expected(&self, i: usize) -> f64 {
         let (wi, wo) = self.directions.pair(i);
-        self.seen.value(wi, wo)
+        self.seen.value(wi, wo) * self.mean_cos()
+    }
+
+    /// What an aperture takes from a diffuse standard: the bare instrument's reading of it lacks the factor that the described one's reduction
+    /// puts in again.
+    pub fn mean_cos(&self) -> f64 {
+        (0.25 * self.described.detector.aperture_deg).to_radians().cos().powi(2)
     }
 
     /// Raw readings of the instrument of this seed.
@@ -111,8 +117,13 @@ impl Experiment {
         })
     }
 
+    /// Reduced as a user does: by the described instrument.
+    pub fn reduced(&self, seed: u64) -> Reduction {
+        chain::reduced("study", &self.raw(seed), &self.described).expect("reduced")
+    }
+
     pub fn outcome(&self, seed: u64, through: bool) -> Outcome {
-        let m = chain::reduced("study", &self.raw(seed), &self.bare).expect("reduced").measurement;
+        let m = self.reduced(seed).measurement;
         let readings = (0..m.len()).map(|i| Some((m.value(0, i)? - self.expected(i), sigma(&m, i)))).collect();
         Outcome { readings, parameters: self.parameters(&m, through) }
     }

@@ -1,9 +1,10 @@
 //! Errors of positions: what a reading changes by when axes, tilt or height are off by their uncertainties, by a model of what is read.
 //!
 //! Each error is moved by ± its σ. Half the difference is the component u, the same error in all readings (of jitter: each reading's own); the
-//! average of both less the value in the middle, q, is what the error's square does: its mean square is 3 q², which counts as the reading's own.
-//! Where squares matter the errors' effect is no normal distribution: there [`super::spread`] draws them all, and the variance is that of the normal
-//! distribution whose 95 % interval is as wide.
+//! average of both less the value in the middle, q, is what the error's square does: its mean square is 3 q². Where squares matter the errors' effect
+//! is no normal distribution: there [`super::spread`] draws them all, and the variance is that of the normal distribution whose 95 % interval is as
+//! wide. What squares of kept errors do there is a component too, for it has a pattern, a lobe that is broader or narrower; elsewhere it counts as
+//! the reading's own.
 //!
 //! The model is what is read, the mean over source and aperture in it: a fit to readings has seen that mean already.
 
@@ -239,6 +240,10 @@ fn place(effect: &Effect, errors: &[Off], place: usize, shared: &mut Shared<'_>)
         } else {
             shared.add(*family, (k, 0), place, of_linear.sqrt() * u);
         }
-        shared.add_own(*family, place, of_bent * 3.0 * q * q);
+        if *family == JITTER || effect.whole.is_none() {
+            shared.add_own(*family, place, of_bent * 3.0 * q * q);
+        } else {
+            shared.add(*family, (k, 1), place, (3.0 * of_bent).sqrt() * q);
+        }
     }
 }

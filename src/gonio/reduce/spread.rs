@@ -1,14 +1,13 @@
 //! Errors of positions where a reading does not follow them in proportion: on the flank of a sharp lobe, at its peak.
 //!
-//! All errors are drawn together (GUM Supplement 1). A reading f(x + jitter) stands for f(x − error), since the model was fitted to readings that
-//! have the error in them; the difference's 95 % quantile over 1.96 is the σ of the normal distribution whose 95 % interval is as wide.
+//! All errors are drawn together (GUM Supplement 1) and move the directions of a model that stays where it is: a fitted lobe stands about the mirror
+//! direction wherever the axes' zeros are. The change's 95 % quantile over 1.96 is the σ of the normal distribution whose 95 % interval is as wide.
 
 use std::sync::LazyLock;
 
 use glam::DVec3;
 
 use super::positions::{Off, Optics, Pose};
-use super::shared::JITTER;
 use crate::gonio::simulate::Truth;
 use crate::numeric::stats::normal_quantile;
 
@@ -43,28 +42,14 @@ pub(super) fn variances(
     let per_flux = optics.scale(pair);
     let mut changes = vec![Vec::with_capacity(DRAWS); width];
     for draw in NORMAL.iter() {
-        let (kept, stopped) = poses(errors, draw);
+        let off = errors.iter().zip(draw).fold(Pose::default(), |sum, ((_, of, sigma), z)| sum.plus(&of(z * sigma)));
         let of_reference: f64 = draw.iter().zip(relative).map(|(z, r)| z * r).sum();
-        let meant = optics.flux(pair, &kept, model, width);
-        let read = stopped.map_or_else(|| still.clone(), |pose| optics.flux(pair, &pose, model, width));
+        let read = optics.flux(pair, &off, model, width);
         for (c, list) in changes.iter_mut().enumerate() {
-            list.push((per_flux * (read[c] - meant[c]) - values[c] * of_reference).abs());
+            list.push((per_flux * (read[c] - still[c]) - values[c] * of_reference).abs());
         }
     }
     changes.into_iter().map(|list| (quantile(list, 0.95) / normal_quantile(0.975)).powi(2)).collect()
-}
-
-/// The pose that a reading stands for, all kept errors with their sign turned, and where the axes stopped, if they jitter.
-fn poses(errors: &[Off], draw: &[f64; MOST]) -> (Pose, Option<Pose>) {
-    let (mut kept, mut stopped) = (Pose::default(), None::<Pose>);
-    for ((family, pose, sigma), z) in errors.iter().zip(draw) {
-        if *family == JITTER {
-            stopped = Some(stopped.unwrap_or_default().plus(&pose(z * sigma)));
-        } else {
-            kept = kept.plus(&pose(-z * sigma));
-        }
-    }
-    (kept, stopped)
 }
 
 /// The value below which a share `p` of the list lies; NaN where there are none.

@@ -1,0 +1,78 @@
+//! What a material looks like to an instrument, about: a model fitted to readings, whose slopes tell what errors of positions do.
+
+use glam::DVec3;
+
+use crate::brdf::{LobeKind, LobeTerm, Material, Sight};
+use crate::fit::{FitOptions, fit};
+use crate::gonio::Instrument;
+use crate::gonio::sight::Cones;
+use crate::measurement::{Dimension, Measurement};
+
+/// The model.
+const MODEL: &str = "lambert+phong+phong";
+/// Share by which source and aperture may lower a lobe's peak before its slopes are not those of a lobe any more.
+const SMEARED: f64 = 0.05;
+
+/// A fitted model, and the cones through which it was fitted, where they count.
+pub(super) struct Surrogate {
+    material: Material,
+    cones: Option<Cones>,
+}
+
+impl Surrogate {
+    /// Fits one to reduced readings: plainly, unless source and aperture smear a lobe that stands out. `None` where no fit has an answer.
+    pub fn of(readings: &Measurement, instrument: &Instrument) -> Option<Self> {
+        let options = FitOptions::new(MODEL.parse().ok()?);
+        let plain = fit(readings, &options).ok()?.material;
+        let cones = || Cones::of(instrument).filter(|_| readings.dimension == Dimension::Space);
+        if let Some(cones) = cones().filter(|_| is_smeared(&plain, instrument)) {
+            let cones = std::sync::Arc::new(cones);
+            let seen = FitOptions { through: Some(cones.clone()), ..options };
+            if let Ok(fitted) = fit(readings, &seen) {
+                drop(seen);
+                return Some(Self { material: fitted.material, cones: std::sync::Arc::into_inner(cones) });
+            }
+        }
+        Some(Self { material: plain, cones: None })
+    }
+
+    /// Writes what is read at (wi, wo), all channels, 1/sr.
+    pub fn write_value(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) {
+        let Some((cones, place)) = self.cones.as_ref().and_then(|cones| Some((cones, cones.place(wi, wo)?))) else {
+            return self.material.write_value(wi, wo, out);
+        };
+        out.fill(0.0);
+        for term in &self.material.lobes {
+            for (c, out) in out.iter_mut().enumerate() {
+                *out += term.weight[c] * seen(cones, term, c, place);
+            }
+        }
+    }
+}
+
+/// A lobe of weight 1 through the cones.
+fn seen(cones: &Cones, term: &LobeTerm, channel: usize, place: [f64; 2]) -> f64 {
+    let Some(shape) = term.shape_of(channel) else { return 0.0 };
+    let (mut value, mut slopes) = ([0.0], vec![vec![0.0]; shape.len()]);
+    cones.fill(term.kind, &shape, &[place], &mut value, &mut slopes);
+    value[0]
+}
+
+/// Whether the cones change a lobe whose peak stands out of the diffuse part. Of a lobe of exponent n a disc of half angle a takes n a²/4 of the peak.
+fn is_smeared(material: &Material, instrument: &Instrument) -> bool {
+    let half = |full_deg: f64| 0.5 * full_deg.to_radians();
+    let spread = half(instrument.source.divergence_deg).powi(2) + half(instrument.detector.aperture_deg).powi(2);
+    let diffuse = |c: usize| {
+        let of = material.lobes.iter().filter(|l| l.kind == LobeKind::Lambert);
+        of.map(|l| l.weight[c] / std::f64::consts::PI).sum::<f64>()
+    };
+    let stands_out = |term: &LobeTerm, c: usize| {
+        let exponent = term.shape_of(c).and_then(|shape| shape.first().copied());
+        exponent.is_some_and(|n| {
+            let peak = term.weight[c] * (n + 2.0) / std::f64::consts::TAU;
+            0.25 * n * spread > SMEARED && peak > diffuse(c)
+        })
+    };
+    let channels = 0..material.channels.len();
+    material.lobes.iter().any(|term| channels.clone().any(|c| stands_out(term, c)))
+}
