@@ -5,7 +5,7 @@ use super::source::Source;
 use crate::brdf::{Brdf, Material};
 use crate::control::Control;
 use crate::fit::{FitOptions, fit};
-use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, reduce, simulate};
+use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, lit_rows, reduce, simulate};
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
 
@@ -50,7 +50,7 @@ pub fn measure_raw(
         let (directions, weights) = scan.directions()?;
         let (directions, weights) = (&directions, &weights);
         let job = Job { truth, channels, instrument, directions, weights, seed, accuracy: ACCURACY, left_out: &[] };
-        Some(job.run(control))
+        Some(job.run_rows(&lit_rows(directions, scan.rows()), control))
     })
 }
 
