@@ -5,7 +5,7 @@ use super::source::Source;
 use super::surrogate::Surrogate;
 use crate::brdf::{Brdf, Material};
 use crate::control::Control;
-use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, reduce, simulate};
+use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, lit_rows, reduce, simulate};
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
 
@@ -47,7 +47,7 @@ pub fn measure_raw(
         let (directions, weights) = (&directions, &weights);
         let (dimension, accuracy) = (scan.dimension(), ACCURACY);
         let job = Job { truth, channels, instrument, dimension, directions, weights, seed, accuracy, left_out: &[] };
-        Some(job.run(control))
+        Some(job.run_rows(&lit_rows(directions, scan.rows()), control))
     })
 }
 

@@ -43,6 +43,7 @@ fn merl_grid(angles: MerlAngles) -> Scan {
         directions: Directions::Merl(MerlGrid { angles }),
         weights: Weights::Merl,
         dimension: Dimension::Space,
+        rows: Vec::new(),
     }
 }
 

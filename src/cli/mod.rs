@@ -14,6 +14,7 @@ mod instrument;
 mod instruments;
 mod models;
 mod output;
+mod plan;
 mod reduce;
 mod render;
 mod scenes;
@@ -64,6 +65,8 @@ enum Command {
     Simulate(simulate::Args),
     /// Reduce raw readings to a measurement: BRDF ± σ, with what readings share
     Reduce(reduce::Args),
+    /// Propose where to measure, for a budget of instrument hours
+    Plan(plan::Args),
     /// Say what is in a measurement
     Info(info::Args),
     /// Fit an analytic model to each measurement
@@ -118,6 +121,7 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(&args, ui),
         Command::Simulate(args) => simulate::run(&args, ui),
         Command::Reduce(args) => reduce::run(&args, ui),
+        Command::Plan(args) => plan::run(&args, ui),
         Command::Info(args) => info::run(&args, ui),
         Command::Fit(args) => fit::run(&args, ui),
         Command::Render(args) => render::run(&args, ui),

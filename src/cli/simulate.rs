@@ -7,7 +7,7 @@ use serde_json::json;
 use super::failure::Failure;
 use super::instrument::{read_instrument, read_spec};
 use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, write_measurement, write_text};
-use super::ui::Ui;
+use super::ui::{Ui, significant};
 use crate::chain;
 use crate::gonio::{self, Instrument, Scan};
 use crate::measurement::{ReadOptions, formats};
@@ -81,16 +81,18 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let valid = table.values.len() as u64 - table.masked.total();
     if args.out.as_os_str() != "-" {
         let effects = gonio::plan(&plan.instrument, &table.channels);
+        let hours = gonio::hours(&plan.instrument, &gonio::lit_rows(&table.directions, plan.scan.rows()));
         let on: Vec<&str> = effects.effects.iter().filter(|e| e.on).map(|e| e.name).collect();
         let text = format!(
-            "{}: {} direction pairs, {valid} valid values, scan {}, seed {}; effects: {}",
+            "{}: {} direction pairs, {valid} valid values, scan {}, seed {}, {} h of the instrument; effects: {}",
             args.out.display(),
             table.len(),
             plan.scan,
             plan.seed,
+            significant(hours),
             if on.is_empty() { "none".into() } else { on.join(", ") }
         );
-        let object = json!({ "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed, "effects": effects.effects });
+        let object = json!({ "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed, "instrument_hours": hours, "effects": effects.effects });
         ui.result(&text, &object);
     }
     Ok(())
@@ -127,7 +129,7 @@ impl Plan {
         };
         let list = scan.as_ref().and_then(|s| s.strip_prefix("list:"));
         keeps_inputs("--out", &args.out, [Some(&material[..]), list].into_iter().flatten().map(Path::new))?;
-        let scan = scan.map_or(Ok(Scan::Hemisphere { step_deg: 5.0 }), |text| parse_scan(&text))?;
+        let scan = scan.map_or(Ok(Scan::Hemisphere { step_deg: 5.0 }), |text| parse_scan(&text))?.merged();
         let of_file = args.instrument.as_deref().map(read_instrument).transpose()?;
         let of_spec_file = || of_spec.map_or_else(Instrument::default, |s| s.instrument.clone());
         let mut instrument = of_file.unwrap_or_else(of_spec_file);
@@ -155,7 +157,7 @@ fn relative_to(base: &Path, name: &str) -> String {
 pub(super) fn parse_scan(text: &str) -> Result<Scan, Failure> {
     if let Some(file) = text.strip_prefix("list:") {
         let (directions, weights, dimension) = formats::read_directions(Path::new(file), &ReadOptions::default())?;
-        return Ok(Scan::List { name: file.into(), directions, weights, dimension });
+        return Ok(Scan::List { name: file.into(), directions, weights, dimension, rows: Vec::new() });
     }
     text.parse().map_err(|e: crate::gonio::ScanError| Failure::usage(e.to_string()))
 }

@@ -91,6 +91,12 @@ impl Ui {
     }
 }
 
+/// A positive number to three significant digits.
+pub(super) fn significant(x: f64) -> String {
+    let digits = if x > 0.0 && x.is_finite() { (2 - x.log10().floor() as i32).clamp(0, 12) } else { 0 };
+    format!("{x:.*}", digits as usize)
+}
+
 /// Prints a line on stderr; a closed pipe is no error.
 fn print_aside(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");

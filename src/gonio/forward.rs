@@ -40,16 +40,28 @@ pub struct Job<'a> {
 /// The relative error of means over source and aperture, if nothing else is asked for.
 pub const ACCURACY: f64 = 1e-6;
 
+/// The pairs of directions above the horizon in the order in which `rows` has them; all in their own order where it is empty.
+#[must_use]
+pub fn lit_rows(directions: &Directions, rows: &[u32]) -> Vec<u32> {
+    let is_lit = |entry: &u32| {
+        let (wi, wo) = directions.pair(*entry as usize);
+        wi.z > 0.0 && wo.z > 0.0
+    };
+    let all = || (0..directions.len() as u32).filter(is_lit).collect();
+    if rows.is_empty() { all() } else { rows.iter().copied().filter(is_lit).collect() }
+}
+
 impl Job<'_> {
     /// Reads all pairs of directions above the horizon, with this instrument's own errors.
     #[must_use]
     pub fn run(&self, control: Control<'_>) -> Raw {
-        let is_lit = |entry: &u32| {
-            let (wi, wo) = self.directions.pair(*entry as usize);
-            wi.z > 0.0 && wo.z > 0.0
-        };
-        let entries: Vec<u32> = (0..self.directions.len() as u32).filter(is_lit).collect();
-        let readings = series(self.instrument, &entries);
+        self.run_rows(&lit_rows(self.directions, &[]), control)
+    }
+
+    /// Reads these pairs of directions in this order ([`series`]).
+    #[must_use]
+    pub fn run_rows(&self, rows: &[u32], control: Control<'_>) -> Raw {
+        let readings = series(self.instrument, rows);
         let actual = Actual::draw(self.instrument, &readings, self.seed).within(self.dimension);
         self.read(readings, &actual, control)
     }

@@ -5,6 +5,8 @@
 //! (seed, channel, position in the scan), so it depends on neither threads nor order; an instrument's own errors are keyed by the seed.
 
 mod actual;
+mod cost;
+pub mod design;
 mod effects;
 mod forward;
 mod instrument;
@@ -21,8 +23,9 @@ mod simulate;
 mod spec;
 
 pub use actual::Actual;
+pub use cost::{hours, seconds};
 pub use effects::plan;
-pub use forward::{ACCURACY, Job};
+pub use forward::{ACCURACY, Job, lit_rows};
 pub use instrument::Instrument;
 pub use presets::{PRESETS, Preset};
 pub use raw::Raw;

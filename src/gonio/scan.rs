@@ -1,5 +1,6 @@
 //! Where the instrument measures: pairs of directions, with the solid angle that each stands for.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -39,6 +40,8 @@ pub enum Scan {
         weights: Weights,
         /// Flat world or space.
         dimension: Dimension,
+        /// The order in which the directions are read, by index, and how often; empty for each once, in their own.
+        rows: Vec<u32>,
     },
 }
 
@@ -97,6 +100,31 @@ impl Scan {
         }
     }
 
+    /// A list of which a pair of directions that comes more than once is one, read as often as it comes, in one stop where it follows itself.
+    /// What it stands for is what its first row says. Other scans stay what they are.
+    #[must_use]
+    pub fn merged(self) -> Self {
+        let Self::List { name, directions: Directions::List { wi, wo }, weights, dimension, .. } = self else {
+            return self;
+        };
+        let (rows, firsts) = distinct(&wi, &wo);
+        if firsts.len() == rows.len() {
+            return Self::List { name, directions: Directions::List { wi, wo }, weights, dimension, rows: Vec::new() };
+        }
+        let kept = |list: &[DVec3]| firsts.iter().map(|&i| list[i]).collect();
+        let directions = Directions::List { wi: kept(&wi), wo: kept(&wo) };
+        Self::List { name, directions, weights: kept_weights(weights, &firsts), dimension, rows }
+    }
+
+    /// The order in which the directions are read, by index, and how often; empty for each once, in their own.
+    #[must_use]
+    pub fn rows(&self) -> &[u32] {
+        match self {
+            Self::List { rows, .. } => rows,
+            _ => &[],
+        }
+    }
+
     /// The pairs of directions and what each stands for; `None` where the step asks for more than 16 million.
     #[must_use]
     pub fn directions(&self) -> Option<(Directions, Weights)> {
@@ -113,6 +141,30 @@ impl Scan {
             Self::Merl => Some((Directions::Merl(MerlGrid::default()), Weights::Merl)),
             Self::List { directions, weights, .. } => Some((directions.clone(), weights.clone())),
         }
+    }
+}
+
+/// Of every pair which of the distinct ones it is, and where each of those comes first.
+fn distinct(wi: &[DVec3], wo: &[DVec3]) -> (Vec<u32>, Vec<usize>) {
+    let (mut seen, mut firsts) = (HashMap::new(), Vec::new());
+    let mut index = |(i, pair): (usize, (&DVec3, &DVec3))| {
+        // −0 is 0.
+        let key = [pair.0, pair.1].map(|w| w.to_array().map(|x| (x + 0.0).to_bits()));
+        *seen.entry(key).or_insert_with(|| {
+            firsts.push(i);
+            firsts.len() as u32 - 1
+        })
+    };
+    (wi.iter().zip(wo).enumerate().map(&mut index).collect(), firsts)
+}
+
+/// What the directions `kept` stand for.
+fn kept_weights(weights: Weights, kept: &[usize]) -> Weights {
+    let of = |list: Vec<f64>| kept.iter().map(|&i| list[i]).collect();
+    match weights {
+        Weights::SolidAngle(list) => Weights::SolidAngle(of(list)),
+        Weights::Column(list) => Weights::Column(of(list)),
+        other => other,
     }
 }
 
@@ -184,6 +236,25 @@ mod tests {
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
         assert_eq!(directions.len(), 9 * (1 + 8 * 36));
         assert!(Scan::Hemisphere { step_deg: 0.1 }.directions().is_none());
+    }
+
+    #[test]
+    fn a_list_reads_a_pair_as_often_as_it_comes() {
+        let at = |deg: f64| direction_deg(deg, 0.0);
+        let list = |degrees: &[f64]| {
+            let wo: Vec<DVec3> = degrees.iter().map(|d| at(*d)).collect();
+            let directions = Directions::List { wi: vec![DVec3::Z; wo.len()], wo };
+            let weights = Weights::Column((0..degrees.len()).map(|i| i as f64).collect());
+            let name = "l".into();
+            Scan::List { name, directions, weights, dimension: Dimension::Space, rows: vec![] }.merged()
+        };
+        let once = list(&[10.0, 20.0]);
+        assert!(once.rows().is_empty() && once.directions().expect("small").0.len() == 2);
+        let scan = list(&[10.0, 10.0, 20.0, 10.0, 30.0]);
+        let (directions, weights) = scan.directions().expect("small");
+        assert_eq!(scan.rows(), [0, 0, 1, 0, 2]);
+        assert_eq!(weights, Weights::Column(vec![0.0, 2.0, 4.0]));
+        assert_eq!(directions.pair(2).1, at(30.0));
     }
 
     #[test]

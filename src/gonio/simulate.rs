@@ -26,6 +26,7 @@ pub fn simulate(
 ) -> Option<Measurement> {
     let (directions, weights) = scan.directions()?;
     let (n, width) = (directions.len(), channels.len());
+    let times = times(scan, n);
     control.progress.start("measuring", n as u64);
     let blocks: Vec<Block> = (0..n.div_ceil(BLOCK))
         .into_par_iter()
@@ -40,6 +41,8 @@ pub fn simulate(
             for (slot, i) in range.enumerate() {
                 let (wi, wo) = directions.pair(i);
                 if wi.z > 0.0 && wo.z > 0.0 && truth(wi, wo, &mut f) {
+                    let repeated = times.get(i).map(|&times| repeated(instrument, times));
+                    let instrument = repeated.as_ref().unwrap_or(instrument);
                     for (c, f) in f.iter().enumerate() {
                         let reading = instrument.read(*f, wo.z, seed, (i * width + c) as u64);
                         (values[c * len + slot], sigma[c * len + slot]) = reading;
@@ -65,6 +68,21 @@ pub fn simulate(
         sigma,
         ..Measurement::new(name, directions, channels.to_vec(), values)
     })
+}
+
+/// How often each pair of directions is read; empty where each is once.
+fn times(scan: &Scan, n: usize) -> Vec<u32> {
+    if scan.rows().is_empty() {
+        return Vec::new();
+    }
+    let mut times = vec![0u32; n];
+    scan.rows().iter().for_each(|&row| times[row as usize] += 1);
+    times
+}
+
+/// The instrument that takes so many times the readings.
+fn repeated(instrument: &Instrument, times: u32) -> Instrument {
+    Instrument { readings: instrument.readings.saturating_mul(times), ..instrument.clone() }
 }
 
 /// Values and σ of a block, each channel-major.

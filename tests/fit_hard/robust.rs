@@ -126,7 +126,10 @@ fn in_plane(truth: &Material, incidences: &[f64], most: i32) -> Measurement {
     let (wi, wo) = pairs.map(|(i, o)| (towards(i), towards(o))).unzip();
     let directions = Directions::List { wi, wo };
     let weights = Weights::Uniform;
-    exact(truth, &Scan::List { name: "in plane".into(), directions, weights, dimension: Dimension::Space })
+    exact(
+        truth,
+        &Scan::List { name: "in plane".into(), directions, weights, dimension: Dimension::Space, rows: vec![] },
+    )
 }
 
 /// In-plane scans at three incidences, 93 readings of a glossy lobe of exponent 30 with noise; a share of them too high by about 100 σ,

@@ -56,7 +56,13 @@ pub fn picked(directions: &Directions, weights: &Weights, chosen: &[usize]) -> S
     } else {
         Weights::Uniform
     };
-    Scan::List { name: "part".into(), directions: Directions::List { wi, wo }, weights, dimension: Dimension::Space }
+    Scan::List {
+        name: "part".into(),
+        directions: Directions::List { wi, wo },
+        weights,
+        dimension: Dimension::Space,
+        rows: vec![],
+    }
 }
 
 /// r·wo, with r the mirror image of wi about the normal.

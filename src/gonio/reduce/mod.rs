@@ -14,6 +14,7 @@ mod visits;
 use glam::DVec3;
 
 pub use budget::{Budget, Line, Type};
+pub(super) use stops::limit as saturation_limit;
 
 use self::shared::Shared;
 use self::stops::{Rate, Stop};

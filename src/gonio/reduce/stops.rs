@@ -70,7 +70,7 @@ fn combined(raw: &Raw, instrument: &Instrument, first: usize, run: &[Reading]) -
 }
 
 /// Signals from here on may be saturated: noise and nonlinearity may lower them by no more than this.
-fn limit(instrument: &Instrument) -> f64 {
+pub(in crate::gonio) fn limit(instrument: &Instrument) -> f64 {
     let detector = &instrument.detector;
     if detector.full_well == 0.0 {
         return f64::INFINITY;

@@ -1,0 +1,190 @@
+//! `goniofit plan`: where to measure, for a budget of instrument hours.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use super::failure::Failure;
+use super::output::{check_folder, keeps_inputs, stdout_is_free, write_text};
+use super::simulate::read_spec;
+use super::ui::{Ui, significant};
+use crate::brdf::ModelSpec;
+use crate::fit::Limit;
+use crate::gonio::design::{self, Plan, Precision, Prior, QUANTILES, Range, Wish, precision};
+use crate::gonio::{Instrument, Scan, lit_rows};
+use crate::measurement::formats::{push_number, spherical_deg};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit plan --budget 2h --instrument lab.toml --out scan.csv
+  goniofit plan --model lambert+phong --budget 30min --prior phong.exponent=50..500 --out scan.csv")]
+pub(super) struct Args {
+    /// The model whose parameters are wanted: lobes joined by +
+    #[arg(long, default_value = "lambert+phong", value_name = "SPEC")]
+    model: ModelSpec,
+    /// Time of the instrument, moves and visits to the reference included: 2h or 30min say
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    budget: Duration,
+    /// The instrument: a simulation file whose [instrument] counts (see docs/instrument.md) [default: that of `simulate`]
+    #[arg(long, value_name = "I")]
+    instrument: Option<PathBuf>,
+    /// Where a parameter may lie, evenly on a logarithmic scale; may be repeated for others [default: lambert.weight=0.05..0.8,
+    /// phong.weight=0.02..0.3, phong.exponent=10..1000, several lobes sharing the exponents]
+    #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range)]
+    prior: Vec<Limit>,
+    /// Where to write the pairs of directions, for `simulate --scan list:SCAN.csv`; equal rows in a row are one stop; `-` is stdout
+    #[arg(long, value_name = "SCAN.csv")]
+    out: PathBuf,
+}
+
+/// Scans that are usual, to compare with.
+const STANDARD: [Scan; 4] = [
+    Scan::InPlane { step_deg: 1.0 },
+    Scan::InPlane { step_deg: 5.0 },
+    Scan::Hemisphere { step_deg: 5.0 },
+    Scan::Hemisphere { step_deg: 10.0 },
+];
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    check_folder(&args.out)?;
+    keeps_inputs("--out", &args.out, args.instrument.as_deref())?;
+    stdout_is_free(&args.out, ui)?;
+    let instrument = args.instrument.as_deref().map(read_spec).transpose()?.map(|s| s.instrument).unwrap_or_default();
+    let prior = prior(args)?;
+    let budget_s = args.budget.as_secs_f64();
+    let plan = design::plan(&Wish { prior: &prior, instrument: &instrument, budget_s }).map_err(|e| said(&e))?;
+    if plan.undetermined > 0 {
+        let (some, all) = (plan.undetermined, plan.draws);
+        ui.warn(&format!(
+            "at {some} of {all} points of the prior no scan tells the parameters: planned for the others"
+        ));
+    }
+    let table = Table::new(&prior, &instrument, plan, budget_s / 3600.0);
+    write_text(&args.out, &table.scan())?;
+    if args.out != Path::new("-") {
+        ui.result(&table.text(&args.out), &table.object(&args.out));
+    }
+    Ok(())
+}
+
+/// The usual prior with the ranges that were typed.
+fn prior(args: &Args) -> Result<Prior, Failure> {
+    if let Some((i, j)) = Limit::doubled(&args.prior) {
+        return Err(Failure::usage(format!("--prior: {} and {} limit one parameter", args.prior[i], args.prior[j])));
+    }
+    let range = |limit: &Limit| Range { name: limit.parameter.to_string(), low: limit.low, high: limit.high };
+    let usual = Prior::usual(&args.model).map_err(|e| Failure::usage(format!("--{e}")))?;
+    let with = |prior: Prior, limit: &Limit| prior.with(range(limit));
+    args.prior.iter().try_fold(usual, with).map_err(|e| Failure::usage(format!("--prior {e}")))
+}
+
+fn said(wrong: &design::Wrong) -> Failure {
+    let option = match wrong {
+        design::Wrong::Budget { .. } | design::Wrong::TooMany { .. } => "--",
+        _ => "",
+    };
+    Failure::usage(format!("{option}{wrong}"))
+}
+
+/// `2h` or `30min`.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    humantime::parse_duration(text)
+        .ok()
+        .filter(|t| !t.is_zero())
+        .ok_or_else(|| "expected a time of more than 0, 2h or 30min say".into())
+}
+
+/// The plan beside the usual scans.
+struct Table {
+    names: Vec<String>,
+    /// Name, precision, share of the best information a second.
+    scans: Vec<(String, Precision, f64)>,
+    plan: Plan,
+    budget_h: f64,
+}
+
+impl Table {
+    fn new(prior: &Prior, instrument: &Instrument, plan: Plan, budget_h: f64) -> Self {
+        let mut scans = vec![("plan".to_owned(), plan.precision.clone())];
+        for scan in STANDARD {
+            if let Some((directions, _)) = scan.directions() {
+                let rows = lit_rows(&directions, &[]);
+                scans.push((scan.to_string(), precision(prior, instrument, &directions, &rows)));
+            }
+        }
+        let scans = scans.into_iter().map(|(name, of)| {
+            let efficiency = plan.efficiency(&of);
+            (name, of, efficiency)
+        });
+        let scans = scans.collect();
+        let names = prior.names().into_iter().map(str::to_owned).collect();
+        Self { names, scans, plan, budget_h }
+    }
+
+    /// The scan as a file.
+    fn scan(&self) -> String {
+        let mut text = String::from("# goniofit plan, equal rows in a row are one stop\n");
+        text.push_str("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg\n");
+        for &row in &self.plan.rows {
+            let (wi, wo) = self.plan.directions.pair(row as usize);
+            [spherical_deg(wi), spherical_deg(wo)].into_iter().flatten().for_each(|a| push_number(&mut text, a));
+            text.pop(); // the last comma
+            text.push('\n');
+        }
+        text
+    }
+
+    fn text(&self, out: &Path) -> String {
+        let of = &self.plan.precision;
+        let pairs = self.plan.directions.len();
+        let mut text = format!(
+            "{}: {pairs} pairs of directions, {} stops, {} readings, {} h of {} h\n\n",
+            out.display(),
+            of.stops,
+            of.rows,
+            significant(of.hours),
+            significant(self.budget_h)
+        );
+        let heads: Vec<String> = self.names.iter().map(|n| format!("{n:>24}")).collect();
+        // Writing to a String can't fail.
+        let _ = writeln!(text, "{:14}{:>9}{:>9}{:>12}{}", "scan", "stops", "hours", "efficiency", heads.join(""));
+        for (name, of, efficiency) in &self.scans {
+            let _ = writeln!(text, "{}", Self::line(name, of, 1.0, *efficiency));
+        }
+        let _ = writeln!(text, "as many hours as the plan:");
+        for (name, of, efficiency) in &self.scans[1..] {
+            let _ = writeln!(text, "{}", Self::line(name, of, (of.hours / self.scans[0].1.hours).sqrt(), *efficiency));
+        }
+        text.push_str(
+            "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' own noise. \
+             Efficiency: the share of the best information an hour.",
+        );
+        text
+    }
+
+    /// One scan; its errors times `scale`.
+    fn line(name: &str, of: &Precision, scale: f64, efficiency: f64) -> String {
+        let percent = |e: f64| if e.is_finite() { significant(100.0 * scale * e) } else { "open".into() };
+        let cell = |e: &[f64; 3]| format!("{:>24}", format!("{} ({})", percent(e[1]), percent(e[2])));
+        let cells: Vec<String> = of.errors.iter().map(cell).collect();
+        let hours = significant(of.hours / scale.powi(2)); // errors fall as 1/√hours
+        let share = format!("{} %", significant(100.0 * efficiency));
+        format!("{name:14}{:>9}{hours:>9}{share:>12}{}", of.stops, cells.join(""))
+    }
+
+    fn object(&self, out: &Path) -> Value {
+        let finite = |e: f64| if e.is_finite() { json!(e) } else { Value::Null };
+        let errors = |of: &Precision| -> Vec<Value> {
+            let one = |(name, e): (&String, &[f64; 3])| json!({ "parameter": name, "relative": e.map(finite) });
+            self.names.iter().zip(&of.errors).map(one).collect()
+        };
+        let scan = |(name, of, efficiency): &(String, Precision, f64)| json!({ "scan": name, "stops": of.stops, "readings": of.rows, "hours": of.hours, "efficiency": efficiency, "errors": errors(of) });
+        let scans: Vec<Value> = self.scans.iter().map(scan).collect();
+        json!({
+            "out": out, "pairs": self.plan.directions.len(), "budget_hours": self.budget_h, "quantiles": QUANTILES,
+            "undetermined": self.plan.undetermined, "draws": self.plan.draws, "scans": scans,
+        })
+    }
+}

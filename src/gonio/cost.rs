@@ -1,0 +1,68 @@
+//! What a scan costs: the time it takes the instrument, from its description.
+//!
+//! A stop at a pair of directions takes `axes.move_s` and, for each of its readings, the sum of the exposures; visits to reference, blank and dark
+//! stand before every block and at the end ([`super::series`]).
+
+use super::instrument::Instrument;
+
+/// Hours that reading these pairs of directions takes, in this order; equal ones in a row are one stop.
+#[must_use]
+pub fn hours(instrument: &Instrument, rows: &[u32]) -> f64 {
+    seconds(instrument, rows) / 3600.0
+}
+
+/// The same in seconds.
+#[must_use]
+pub fn seconds(instrument: &Instrument, rows: &[u32]) -> f64 {
+    let blocks = rows.chunks(instrument.protocol.block as usize);
+    let stops: usize = blocks.clone().map(|block| block.chunk_by(|a, b| a == b).count()).sum();
+    let visits = blocks.len() as f64 + 1.0;
+    visits * visit_s(instrument) + stops as f64 * instrument.axes.move_s + rows.len() as f64 * dwell_s(instrument)
+}
+
+/// Seconds of one reading of a pair of directions: all exposures, all repeats.
+pub(super) fn dwell_s(instrument: &Instrument) -> f64 {
+    f64::from(instrument.readings) * instrument.detector.exposures_s.iter().sum::<f64>()
+}
+
+/// Seconds of a visit to all that readings are compared with.
+pub(super) fn visit_s(instrument: &Instrument) -> f64 {
+    let exposures = &instrument.detector.exposures_s;
+    let longest = exposures.last().copied().unwrap_or(1.0);
+    let once =
+        |present: bool, seconds: f64| if present { f64::from(instrument.protocol.repeats) * seconds } else { 0.0 };
+    let moved = if instrument.has_reference() { instrument.axes.move_s } else { 0.0 };
+    moved
+        + once(instrument.has_reference(), exposures.iter().sum())
+        + once(instrument.surroundings.stray_per_sr > 0.0, longest)
+        + once(instrument.has_dark(), longest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gonio::parts::{Axes, Detector, Protocol, Reference, Surroundings};
+    use crate::gonio::series;
+
+    /// The clock of the readings says the same, with every part and without.
+    #[test]
+    fn hours_are_those_of_the_readings_clock() {
+        let full = Instrument {
+            readings: 2,
+            axes: Axes { move_s: 3.0, ..Axes::default() },
+            reference: Reference { reflectance: 0.99, ..Reference::default() },
+            detector: Detector { dark_per_s: 3.0, exposures_s: vec![0.1, 1.0], ..Detector::default() },
+            surroundings: Surroundings { stray_per_sr: 1e-3, shadow_deg: 0.0 },
+            protocol: Protocol { block: 4, repeats: 3 },
+            ..Instrument::default()
+        };
+        for instrument in [full, Instrument::default()] {
+            for rows in [vec![0, 1, 2, 3, 4, 5], vec![0, 0, 0, 1, 1, 1, 1, 1, 2], vec![7]] {
+                let list = series(&instrument, &rows);
+                let end = list.last().map_or(0.0, |r| r.time_s + r.exposure_s);
+                let said = seconds(&instrument, &rows);
+                assert!((said - end).abs() < 1e-9 * end, "{rows:?}: {said} vs {end}");
+            }
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! The plan: candidates, their information per second, the best shares of the time, whole readings.
+
+use super::candidates::{self, Pair};
+use super::information::{Model, Noise};
+use super::optimum::{Optimum, Table, best};
+use super::precision::{Precision, precision};
+use super::prior::{Prior, Wrong};
+use super::rounding::{self, Share};
+use crate::geometry::angles::{phi_of, theta_of};
+use crate::gonio::cost::{dwell_s, visit_s};
+use crate::gonio::instrument::Instrument;
+use crate::measurement::Directions;
+
+/// What a plan is made for.
+#[derive(Debug, Clone)]
+pub struct Wish<'a> {
+    /// Model and parameters.
+    pub prior: &'a Prior,
+    /// The instrument.
+    pub instrument: &'a Instrument,
+    /// Seconds of the instrument that there are.
+    pub budget_s: f64,
+}
+
+/// A scan that is worth its time.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The distinct pairs of directions.
+    pub directions: Directions,
+    /// The order in which they are read, and how often: equal ones in a row are one stop.
+    pub rows: Vec<u32>,
+    /// What it costs and tells.
+    pub precision: Precision,
+    /// Mean ln det of the information that the best shares of the time give a second, whatever the moves: at least this much less `gap` is best.
+    pub best_a_second: f64,
+    /// By how much that may fall short of the best.
+    pub gap: f64,
+    /// Draws of the prior at which no scan tells the parameters; the plan does without them.
+    pub undetermined: usize,
+    /// Draws of the prior.
+    pub draws: usize,
+}
+
+/// Largest share of the budget that moves to a first stop at every pair may take.
+const MOVES: f64 = 0.2;
+/// Most distinct pairs, and the share of the largest weight that each must have.
+const MOST_PAIRS: usize = 60;
+const LEAST_SHARE: f64 = 0.01;
+
+/// Proposes where to measure.
+///
+/// # Errors
+/// [`Wrong`]: a detector without noise, a prior that no scan tells, a budget that is too small or too large.
+pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
+    let Wish { prior, instrument, budget_s } = *wish;
+    if !instrument.is_noisy() {
+        return Err(Wrong::Noiseless);
+    }
+    let pairs = candidates::pairs(prior.sharpest(), instrument);
+    let draws = prior.draws();
+    let (stops, mut table) = tell(prior, instrument, &pairs, &draws);
+    let open = || Wrong::Undetermined(prior.model().clone());
+    let undetermined = table.drop_undetermined();
+    let optimum = if table.draws.is_empty() { None } else { best(&table) }.ok_or_else(open)?;
+    let (kept, weights) = supported(&table, &optimum, affordable(wish));
+    let share = |(&x, weight): (&usize, &f64)| Share { weight: *weight, ..stops[x] };
+    let mut chosen: Vec<(Pair, Share)> = kept.iter().zip(&weights).map(|of| (pairs[*of.0], share(of))).collect();
+    chosen.sort_by(|a, b| place(a.0).partial_cmp(&place(b.0)).unwrap_or(std::cmp::Ordering::Equal));
+    let shares: Vec<Share> = chosen.iter().map(|c| c.1).collect();
+    let rows = rounding::rows(&shares, instrument, budget_s)?;
+    let (wi, wo) = chosen.iter().map(|c| c.0).unzip();
+    let directions = Directions::List { wi, wo };
+    Ok(Plan {
+        precision: precision(prior, instrument, &directions, &rows),
+        directions,
+        rows,
+        best_a_second: optimum.mean_ln_det,
+        gap: optimum.gap,
+        undetermined,
+        draws: draws.len(),
+    })
+}
+
+impl Plan {
+    /// The share of the best information a second that a scan gives, D-efficiency: exp of the mean ln det over the number of parameters.
+    #[must_use]
+    pub fn efficiency(&self, of: &Precision) -> f64 {
+        let p = of.errors.len() as f64;
+        ((of.mean_ln_det - self.best_a_second) / p).exp() / (3600.0 * of.hours)
+    }
+}
+
+/// Where a pair stands in the order of reading: incidence by incidence, so that the source moves least.
+fn place((wi, wo): Pair) -> [f64; 3] {
+    let side = if wo.x < 0.0 { -1.0 } else { 1.0 };
+    [theta_of(wi), (side * phi_of(side * wo)).abs(), side * theta_of(wo)]
+}
+
+/// How many pairs the budget lets the axes stop at.
+fn affordable(wish: &Wish<'_>) -> usize {
+    let move_s = wish.instrument.axes.move_s;
+    let for_moves = MOVES * (wish.budget_s - 2.0 * visit_s(wish.instrument));
+    let most = if move_s > 0.0 { (for_moves / move_s).max(0.0) as usize } else { MOST_PAIRS };
+    most.clamp(wish.prior.ranges().len(), MOST_PAIRS)
+}
+
+/// How each candidate is best read, and what it tells a second.
+fn tell(prior: &Prior, instrument: &Instrument, pairs: &[Pair], draws: &[Vec<f64>]) -> (Vec<Share>, Table) {
+    let (model, noise) = (Model::of(prior), Noise::of(instrument));
+    let p = model.parameters();
+    let mut told = vec![Vec::with_capacity(pairs.len() * p); draws.len()];
+    let mut gradient = vec![0.0; p];
+    let mut stops = Vec::with_capacity(pairs.len());
+    for pair in pairs {
+        let values: Vec<(f64, Option<f64>, f64)> = draws
+            .iter()
+            .map(|draw| {
+                let f = model.value(draw, *pair, &mut gradient);
+                (f, noise.variance(f, *pair), noise.jitter(&model, draw, f, *pair))
+            })
+            .collect();
+        let stop = length(instrument, values.iter().filter_map(|(_, own, jitter)| own.map(|own| (own, *jitter))));
+        for ((list, draw), (_, own, jitter)) in told.iter_mut().zip(draws).zip(&values) {
+            model.value(draw, *pair, &mut gradient);
+            // All rows of a stop share its jitter.
+            let row = |own: f64| own + f64::from(stop.rows_per_stop) * jitter;
+            let scale = own.map_or(0.0, |own| 1.0 / (row(own) * stop.row_s).sqrt());
+            list.extend(gradient.iter().map(|g| g * scale));
+        }
+        stops.push(stop);
+    }
+    (stops, Table { parameters: p, draws: told })
+}
+
+/// How many rows a stop is best read: longer where noise is large against jitter and moves are dear. A stop costs move + k dwell and leaves
+/// jitter + noise/k: their product is least at k² = move noise/(dwell jitter).
+fn length(instrument: &Instrument, variances: impl Iterator<Item = (f64, f64)>) -> Share {
+    let block = instrument.protocol.block;
+    let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(block);
+    let (mut sum, mut count) = (0.0, 0u32);
+    for (own, jitter) in variances.filter(|(own, jitter)| *own > 0.0 && *jitter > 0.0) {
+        sum += (own / jitter).ln();
+        count += 1;
+    }
+    if count == 0 {
+        return Share { weight: 0.0, row_s, rows_per_stop: block };
+    }
+    let ratio = (sum / f64::from(count)).exp();
+    let best = (instrument.axes.move_s * ratio / row_s).sqrt().round();
+    let rows_per_stop = best.clamp(1.0, f64::from(block)) as u32;
+    Share { weight: 0.0, row_s: row_s + instrument.axes.move_s / f64::from(rows_per_stop), rows_per_stop }
+}
+
+/// The candidates that are worth a stop, `most` at most, and their best weights among themselves: the lesser half is dropped and the rest weighed
+/// anew until few enough are left that still tell the parameters.
+fn supported(table: &Table, optimum: &Optimum, most: usize) -> (Vec<usize>, Vec<f64>) {
+    let mut kept: Vec<usize> = (0..table.len()).filter(|&x| optimum.weights[x] > 0.0).collect();
+    let mut weights: Vec<f64> = kept.iter().map(|&x| optimum.weights[x]).collect();
+    loop {
+        let largest = weights.iter().copied().fold(0.0, f64::max);
+        let worthy = weights.iter().filter(|w| **w >= LEAST_SHARE * largest).count();
+        let wanted = worthy.min(most.max(kept.len() / 2));
+        if wanted == kept.len() {
+            return (kept, weights);
+        }
+        let mut by_weight: Vec<usize> = (0..kept.len()).collect();
+        by_weight.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]));
+        by_weight.truncate(wanted);
+        by_weight.sort_unstable();
+        let fewer: Vec<usize> = by_weight.iter().map(|&i| kept[i]).collect();
+        let Some(again) = best(&table.picked(&fewer)) else { return (kept, weights) };
+        (kept, weights) = (fewer, again.weights);
+    }
+}

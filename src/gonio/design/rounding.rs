@@ -1,0 +1,120 @@
+//! Shares of the time to whole readings that a budget pays for, moves and visits included, in an order that keeps moves few.
+
+use super::prior::Wrong;
+use crate::gonio::cost::{seconds, visit_s};
+use crate::gonio::instrument::Instrument;
+
+/// A candidate that is read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Share {
+    /// Share of the time.
+    pub weight: f64,
+    /// Seconds of one row, its part of the moves and visits included where stops are short.
+    pub row_s: f64,
+    /// Rows of one stop at most: more tell less than another approach, whose jitter is a new one.
+    pub rows_per_stop: u32,
+}
+
+/// Most rows a plan may have.
+const MOST_ROWS: f64 = 1e6;
+
+/// Rows (indices of `shares`, in the order in which they are read) that take no longer than `budget_s`. Each share is multiplied by the same number
+/// and rounded up, as efficient rounding asks (Pukelsheim & Rieder 1992): the number is the largest that the budget pays for.
+///
+/// # Errors
+/// [`Wrong::Budget`] where it does not pay for one row each, [`Wrong::TooMany`].
+pub(super) fn rows(shares: &[Share], instrument: &Instrument, budget_s: f64) -> Result<Vec<u32>, Wrong> {
+    let least_s = seconds(instrument, &in_order(shares, 0.0));
+    if least_s > budget_s {
+        return Err(Wrong::Budget { pairs: shares.len(), least_s, found_s: budget_s });
+    }
+    let cheapest = shares.iter().map(|s| s.row_s).fold(f64::INFINITY, f64::min);
+    let found = (budget_s - 2.0 * visit_s(instrument)) / cheapest;
+    if found > MOST_ROWS {
+        return Err(Wrong::TooMany { found, most: MOST_ROWS });
+    }
+    // No more than the whole budget can be shared out.
+    let (mut low, mut high) = (0.0, 2.0 * budget_s);
+    while high - low > 1e-6 * budget_s {
+        let middle = 0.5 * (low + high);
+        let fits = seconds(instrument, &in_order(shares, middle)) <= budget_s;
+        if fits { low = middle } else { high = middle }
+    }
+    Ok(in_order(shares, low))
+}
+
+/// As many rows as `time_s` seconds shared out give, rounded up, one at least, in stops that are as even as they can be.
+fn in_order(shares: &[Share], time_s: f64) -> Vec<u32> {
+    let count = |s: &Share| ((time_s * s.weight / s.row_s).ceil() as u32).max(1);
+    let counts: Vec<u32> = shares.iter().map(count).collect();
+    let stops: Vec<u32> = counts.iter().zip(shares).map(|(n, s)| n.div_ceil(s.rows_per_stop)).collect();
+    let mut taken = vec![0; shares.len()];
+    let mut rows = Vec::new();
+    for x in alternating(&stops) {
+        // Whole rows of an even split: what is due after this stop less what was due before.
+        let due = |k: u32| u64::from(counts[x]) * u64::from(k) / u64::from(stops[x]);
+        let now = due(taken[x] + 1) - due(taken[x]);
+        rows.extend(std::iter::repeat_n(x as u32, now as usize));
+        taken[x] += 1;
+    }
+    rows
+}
+
+/// Each index as often as `left` says, none twice in a row while another is left: two stops in a row at one pair would be one, of one jitter. Next
+/// comes whichever has most left, the first of equals.
+fn alternating(left: &[u32]) -> Vec<usize> {
+    let mut left = left.to_vec();
+    let mut order: Vec<usize> = Vec::new();
+    loop {
+        let last = order.last().copied();
+        let others = (0..left.len()).filter(|x| left[*x] > 0 && Some(*x) != last);
+        let Some(next) = others.max_by_key(|x| (left[*x], std::cmp::Reverse(*x))).or(last.filter(|x| left[*x] > 0))
+        else {
+            return order;
+        };
+        left[next] -= 1;
+        order.push(next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gonio::parts::Axes;
+
+    fn shares(rows_per_stop: u32) -> Vec<Share> {
+        [0.4, 0.35, 0.25].map(|weight| Share { weight, row_s: 1.0, rows_per_stop }).to_vec()
+    }
+
+    #[test]
+    fn the_budget_is_kept_and_used_but_for_one_round_of_rows() {
+        let instrument = Instrument { axes: Axes { move_s: 7.0, ..Axes::default() }, ..Instrument::default() };
+        for (budget, rows_per_stop) in [(25.0, 500), (100.0, 500), (1000.0, 500), (1000.0, 20)] {
+            let rows = rows(&shares(rows_per_stop), &instrument, budget).expect("enough");
+            let used = seconds(&instrument, &rows);
+            assert!(used <= budget && used > budget - 3.0 * (1.0 + 7.0), "{budget}: {used}");
+            let longest = rows.chunk_by(|a, b| a == b).map(<[u32]>::len).max().unwrap_or(0);
+            assert!(longest <= rows_per_stop as usize);
+        }
+        let many = rows(&shares(500), &instrument, 1e3).expect("enough");
+        let count = |x: u32| many.iter().filter(|r| **r == x).count() as f64 / many.len() as f64;
+        assert!((count(0) - 0.4).abs() < 0.01 && (count(2) - 0.25).abs() < 0.01);
+    }
+
+    #[test]
+    fn stops_alternate_while_another_is_left() {
+        assert_eq!(alternating(&[1, 1, 1]), [0, 1, 2]);
+        let order = alternating(&[3, 5, 1]);
+        assert!(order.len() == 9 && order.windows(2).all(|w| w[0] != w[1]), "{order:?}");
+        assert_eq!(alternating(&[1, 4]), [1, 0, 1, 1, 1]);
+    }
+
+    #[test]
+    fn too_little_says_the_least_that_is_needed() {
+        let instrument = Instrument { axes: Axes { move_s: 7.0, ..Axes::default() }, ..Instrument::default() };
+        let error = rows(&shares(500), &instrument, 23.0).expect_err("too little").to_string();
+        assert!(error.contains("24") && error.contains("23"), "{error}");
+        assert!(rows(&shares(500), &instrument, 24.0).expect("just enough").len() == 3);
+        assert!(matches!(rows(&shares(500), &instrument, 1e8), Err(Wrong::TooMany { .. })));
+    }
+}
