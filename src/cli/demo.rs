@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::failure::Failure;
 use super::fit::plus_minus;
 use super::output::make_folder;
-use super::simulate::read_spec;
+use super::simulation::read_spec;
 use super::ui::{self, Ui};
 use crate::brdf::PerChannel;
 use crate::chain::{Demo, DemoFit, DemoOptions, demo};

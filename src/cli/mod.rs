@@ -7,6 +7,7 @@
 mod compare;
 mod convert;
 mod demo;
+mod effects;
 mod failure;
 mod fit;
 mod info;
@@ -16,6 +17,7 @@ mod reduce;
 mod render;
 mod scenes;
 mod simulate;
+mod simulation;
 mod ui;
 mod validate;
 
@@ -62,6 +64,8 @@ enum Command {
     Simulate(simulate::Args),
     /// Reduce raw readings to a measurement: BRDF ± σ, with what readings share
     Reduce(reduce::Args),
+    /// Say which effects a simulation calls for, why, what each costs and what is off without it
+    Effects(effects::Args),
     /// Say what is in a measurement
     Info(info::Args),
     /// Fit an analytic model to each measurement
@@ -114,6 +118,7 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(&args, ui),
         Command::Simulate(args) => simulate::run(&args, ui),
         Command::Reduce(args) => reduce::run(&args, ui),
+        Command::Effects(args) => effects::run(&args, ui),
         Command::Info(args) => info::run(&args, ui),
         Command::Fit(args) => fit::run(&args, ui),
         Command::Render(args) => render::run(&args, ui),

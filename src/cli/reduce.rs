@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::output::{
     check_folder, keeps_inputs, output_format, read_text, stdout_is_free, write_measurement, write_text,
 };
-use super::simulate::read_spec;
+use super::simulation::read_spec;
 use super::ui::Ui;
 use crate::chain;
 use crate::geometry::angles::{phi_of, theta_of};

@@ -5,6 +5,8 @@
 //! (seed, channel, position in the scan), so it depends on neither threads nor order; an instrument's own errors are keyed by the seed.
 
 mod actual;
+mod afford;
+mod contribution;
 mod effects;
 mod forward;
 mod instrument;
@@ -17,9 +19,12 @@ mod scan;
 mod series;
 pub mod sight;
 mod simulate;
+mod spare;
 mod spec;
 
 pub use actual::Actual;
+pub use afford::Affordable;
+pub use contribution::{Change, Contribution, Contributions};
 pub use effects::plan;
 pub use forward::{ACCURACY, Job};
 pub use instrument::Instrument;
@@ -29,4 +34,5 @@ pub use reduce::{Budget, Line, ReduceError, Reduction, Type, reduce};
 pub use scan::{Scan, ScanError};
 pub use series::series;
 pub use simulate::{Truth, simulate};
+pub use spare::Spared;
 pub use spec::{SimulationSpec, SpecError};

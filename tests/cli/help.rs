@@ -22,8 +22,10 @@ fn examples(help: &str) -> Vec<Vec<String>> {
 #[test]
 fn help_lists_every_command() {
     let found = commands(&Bench::new());
-    let expected =
-        ["demo", "simulate", "reduce", "info", "fit", "render", "validate", "compare", "convert", "models", "scenes"];
+    let expected = [
+        "demo", "simulate", "reduce", "effects", "info", "fit", "render", "validate", "compare", "convert", "models",
+        "scenes",
+    ];
     for name in expected {
         assert!(found.iter().any(|f| f == name), "{name} is missing of {found:?}");
     }

@@ -7,7 +7,7 @@ use super::args::{Args, Wanted};
 use crate::brdf::{Sight, SpecError};
 use crate::cli::failure::Failure;
 use crate::cli::output::keeps_inputs;
-use crate::cli::simulate::read_spec;
+use crate::cli::simulation::read_spec;
 use crate::fit::{Bootstrap, FitOptions, Limit};
 use crate::gonio::sight::Cones;
 
