@@ -5,7 +5,7 @@ use super::source::Source;
 use super::surrogate::Surrogate;
 use crate::brdf::{Brdf, Material};
 use crate::control::Control;
-use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, lit_rows, reduce, simulate};
+use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, reduce, simulate};
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
 
@@ -42,12 +42,27 @@ pub fn measure_raw(
     seed: u64,
     control: Control<'_>,
 ) -> Result<Raw, ChainError> {
+    with_job(name, source, instrument, scan, seed, |job| job.run(control))
+}
+
+/// What `work` makes of the simulation of a material or table along a scan.
+///
+/// # Errors
+/// As [`measure`].
+pub fn with_job<T>(
+    name: &str,
+    source: &Source,
+    instrument: &Instrument,
+    scan: &Scan,
+    seed: u64,
+    work: impl FnOnce(&Job<'_>) -> T,
+) -> Result<T, ChainError> {
     with_truth(name, source, scan, |truth, channels| {
         let (directions, weights) = scan.directions()?;
         let (directions, weights) = (&directions, &weights);
         let (dimension, accuracy) = (scan.dimension(), ACCURACY);
-        let job = Job { truth, channels, instrument, dimension, directions, weights, seed, accuracy, left_out: &[] };
-        Some(job.run_rows(&lit_rows(directions, scan.rows()), control))
+        let (rows, left_out) = (scan.rows(), &[][..]);
+        Some(work(&Job { truth, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out }))
     })
 }
 

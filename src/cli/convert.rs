@@ -7,7 +7,7 @@ use serde_json::json;
 use super::failure::Failure;
 use super::info::Reading;
 use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, write_measurement};
-use super::simulate::parse_scan;
+use super::simulation::parse_scan;
 use super::ui::Ui;
 use crate::chain::{self, Source};
 use crate::gonio::Scan;

@@ -28,6 +28,13 @@ pub(super) fn unknown(name: &str) -> Failure {
 
 /// A simulation file.
 pub(super) fn read_spec(path: &Path) -> Result<SimulationSpec, Failure> {
+    let text = read_text(path)?;
     let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("{}: {e}", path.display()));
-    SimulationSpec::from_toml(&read_text(path)?).map_err(|e| wrong(&e))
+    SimulationSpec::from_toml(&text).map_err(|e| if is_scene(&text) { wrong(&SCENE) } else { wrong(&e) })
+}
+
+const SCENE: &str = "expected a simulation file (version, material, scan, seed, [instrument]), found a scene";
+
+fn is_scene(text: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("camera"))
 }

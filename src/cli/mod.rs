@@ -7,6 +7,7 @@
 mod compare;
 mod convert;
 mod demo;
+mod effects;
 mod failure;
 mod fit;
 mod info;
@@ -19,6 +20,7 @@ mod reduce;
 mod render;
 mod scenes;
 mod simulate;
+mod simulation;
 mod ui;
 mod validate;
 
@@ -67,6 +69,8 @@ enum Command {
     Reduce(reduce::Args),
     /// Propose where to measure, for a budget of instrument hours
     Plan(plan::Args),
+    /// Say which effects a simulation calls for, why, what each costs and what is off without it
+    Effects(effects::Args),
     /// Say what is in a measurement
     Info(info::Args),
     /// Fit an analytic model to each measurement
@@ -122,6 +126,7 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(&args, ui),
         Command::Reduce(args) => reduce::run(&args, ui),
         Command::Plan(args) => plan::run(&args, ui),
+        Command::Effects(args) => effects::run(&args, ui),
         Command::Info(args) => info::run(&args, ui),
         Command::Fit(args) => fit::run(&args, ui),
         Command::Render(args) => render::run(&args, ui),

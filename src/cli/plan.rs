@@ -7,8 +7,8 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use super::failure::Failure;
+use super::instrument::read_instrument;
 use super::output::{check_folder, keeps_inputs, stdout_is_free, write_text};
-use super::simulate::read_spec;
 use super::ui::{Ui, significant};
 use crate::brdf::ModelSpec;
 use crate::fit::Limit;
@@ -27,9 +27,9 @@ pub(super) struct Args {
     /// Time of the instrument, moves and visits to the reference included: 2h or 30min say
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     budget: Duration,
-    /// The instrument: a simulation file whose [instrument] counts (see docs/instrument.md) [default: that of `simulate`]
+    /// The instrument: a built-in one (see `goniofit instruments`), or a simulation file whose [instrument] counts [default: that of `simulate`]
     #[arg(long, value_name = "I")]
-    instrument: Option<PathBuf>,
+    instrument: Option<String>,
     /// Where a parameter may lie, evenly on a logarithmic scale; may be repeated for others [default: lambert.weight=0.05..0.8,
     /// phong.weight=0.02..0.3, phong.exponent=10..1000, several lobes sharing the exponents]
     #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range)]
@@ -49,9 +49,9 @@ const STANDARD: [Scan; 4] = [
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     check_folder(&args.out)?;
-    keeps_inputs("--out", &args.out, args.instrument.as_deref())?;
+    keeps_inputs("--out", &args.out, args.instrument.as_deref().map(Path::new))?;
     stdout_is_free(&args.out, ui)?;
-    let instrument = args.instrument.as_deref().map(read_spec).transpose()?.map(|s| s.instrument).unwrap_or_default();
+    let instrument = args.instrument.as_deref().map(read_instrument).transpose()?.unwrap_or_default();
     let prior = prior(args)?;
     let budget_s = args.budget.as_secs_f64();
     let plan = design::plan(&Wish { prior: &prior, instrument: &instrument, budget_s }).map_err(|e| said(&e))?;

@@ -29,6 +29,8 @@ pub struct Job<'a> {
     pub directions: &'a Directions,
     /// What each of them stands for.
     pub weights: &'a Weights,
+    /// Which of them are read, in order, as often as they occur; each once where it is empty.
+    pub rows: &'a [u32],
     /// Seed of the noise and of the instrument's own errors.
     pub seed: u64,
     /// Relative error that means over source and aperture may have.
@@ -55,23 +57,21 @@ impl Job<'_> {
     /// Reads all pairs of directions above the horizon, with this instrument's own errors.
     #[must_use]
     pub fn run(&self, control: Control<'_>) -> Raw {
-        self.run_rows(&lit_rows(self.directions, &[]), control)
+        let (readings, actual) = self.prepare();
+        self.read(readings, &actual, control)
     }
 
-    /// Reads these pairs of directions in this order ([`series`]).
-    #[must_use]
-    pub fn run_rows(&self, rows: &[u32], control: Control<'_>) -> Raw {
-        let readings = series(self.instrument, rows);
+    /// The readings that are to be made, and what the instrument is really like.
+    pub(super) fn prepare(&self) -> (Vec<Reading>, Actual) {
+        let readings = series(self.instrument, &lit_rows(self.directions, self.rows));
         let actual = Actual::draw(self.instrument, &readings, self.seed).within(self.dimension);
-        self.read(readings, &actual, control)
+        (readings, actual)
     }
 
     /// Reads everything by an instrument with the errors `actual`.
     #[must_use]
     pub fn read(&self, readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
-        let Self { truth, channels, instrument, seed, accuracy, dimension, .. } = *self;
-        let passes =
-            effects::passes(&Maker { instrument, dimension, channels, actual, truth, seed, accuracy }, self.left_out);
+        let passes = effects::passes(&self.maker(actual), self.left_out);
         let (n, width) = (readings.len(), self.channels.len());
         control.progress.start("reading", n as u64);
         let blocks: Vec<(Vec<f64>, f64)> = (0..n.div_ceil(BLOCK))
@@ -82,7 +82,7 @@ impl Job<'_> {
                 if control.stop.requested() {
                     block.signal.fill(f64::NAN); // not read
                 } else {
-                    passes.iter().for_each(|pass| pass.apply(&mut block));
+                    passes.iter().for_each(|step| step.pass.apply(&mut block));
                 }
                 control.progress.advance(range.len() as u64);
                 (block.signal, block.error)
@@ -92,9 +92,20 @@ impl Job<'_> {
         let quadrature_error = blocks.iter().map(|b| b.1).fold(0.0, f64::max);
         let mut signal = Vec::with_capacity(n * width);
         blocks.into_iter().for_each(|(part, _)| signal.extend(part));
+        self.raw(readings, signal, quadrature_error)
+    }
+
+    /// What passes are made from.
+    pub(super) fn maker<'b>(&'b self, actual: &'b Actual) -> Maker<'b> {
+        let Self { truth, channels, instrument, seed, accuracy, dimension, .. } = *self;
+        Maker { instrument, dimension, channels, actual, truth, seed, accuracy }
+    }
+
+    /// Readings with these signals.
+    pub(super) fn raw(&self, readings: Vec<Reading>, signal: Vec<f64>, quadrature_error: f64) -> Raw {
         Raw {
             channels: self.channels.to_vec(),
-            dimension,
+            dimension: self.dimension,
             directions: self.directions.clone(),
             weights: self.weights.clone(),
             readings,
@@ -104,7 +115,7 @@ impl Job<'_> {
     }
 
     /// Readings in the directions that are meant, the signal 1 yet.
-    fn block<'b>(&self, readings: &'b [Reading], first: usize) -> Block<'b> {
+    pub(super) fn block<'b>(&self, readings: &'b [Reading], first: usize) -> Block<'b> {
         let pair = |reading: &Reading| match (reading.kind, reading.entry) {
             (Kind::Sample, Some(entry)) => self.directions.pair(entry as usize),
             (Kind::Reference, _) => reference_pair(&self.instrument.reference),

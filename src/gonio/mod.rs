@@ -5,6 +5,8 @@
 //! (seed, channel, position in the scan), so it depends on neither threads nor order; an instrument's own errors are keyed by the seed.
 
 mod actual;
+mod afford;
+mod contribution;
 mod cost;
 pub mod design;
 mod effects;
@@ -20,9 +22,12 @@ mod scan;
 mod series;
 pub mod sight;
 mod simulate;
+mod spare;
 mod spec;
 
 pub use actual::Actual;
+pub use afford::Affordable;
+pub use contribution::{Change, Contribution, Contributions};
 pub use cost::{hours, seconds};
 pub use effects::plan;
 pub use forward::{ACCURACY, Job, lit_rows};
@@ -34,4 +39,5 @@ pub use reduce::{Budget, Line, ReduceError, Reduction, Type, reduce};
 pub use scan::{Scan, ScanError};
 pub use series::series;
 pub use simulate::{Truth, simulate};
+pub use spare::Spared;
 pub use spec::{SimulationSpec, SpecError};

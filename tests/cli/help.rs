@@ -26,6 +26,7 @@ fn help_lists_every_command() {
         "demo",
         "simulate",
         "reduce",
+        "effects",
         "plan",
         "info",
         "fit",

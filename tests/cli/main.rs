@@ -3,6 +3,7 @@
 
 mod bench;
 mod chain;
+mod effects;
 mod failures;
 mod fit_file;
 mod fit_options;

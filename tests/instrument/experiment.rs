@@ -111,6 +111,7 @@ impl Experiment {
             dimension: Dimension::Space,
             directions: &self.directions,
             weights: &Weights::Uniform,
+            rows: &[],
             seed,
             accuracy: ACCURACY,
             left_out: &[],

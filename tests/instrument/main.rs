@@ -4,6 +4,8 @@
 #![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
 mod budget;
+mod cones;
+mod contributions;
 mod coverage;
 #[allow(dead_code)] // its study prints more than tests judge
 mod experiment;

@@ -78,7 +78,18 @@ pub fn with_job<T>(
     let (directions, weights) = (&scan.0, &scan.1);
     let (accuracy, channels) = (1e-9, &of.channels);
     let dimension = if of.is_flat() { Dimension::Flat } else { Dimension::Space };
-    work(&Job { truth: &truth, channels, instrument, dimension, directions, weights, seed, accuracy, left_out })
+    work(&Job {
+        truth: &truth,
+        channels,
+        instrument,
+        dimension,
+        directions,
+        weights,
+        rows: &[],
+        seed,
+        accuracy,
+        left_out,
+    })
 }
 
 /// Reduced, errors of positions by the slopes of `model`.

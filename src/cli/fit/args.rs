@@ -116,7 +116,7 @@ fn parse_weights(text: &str) -> Result<WeightMode, String> {
 }
 
 /// `50ms` or `2s`.
-fn parse_time(text: &str) -> Result<Duration, String> {
+pub(in crate::cli) fn parse_time(text: &str) -> Result<Duration, String> {
     if text.trim() == "0" {
         return Err("expected a time of more than 0, 50ms or 2s say".into());
     }
@@ -128,7 +128,7 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 }
 
 /// `1%` or `0.01`.
-fn parse_share(text: &str) -> Result<f64, String> {
+pub(in crate::cli) fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
     let share: Option<f64> = number.trim().parse().ok().filter(|share: &f64| *share > 0.0 && share.is_finite());
     share.map(|share| share * unit).ok_or_else(|| "expected a positive share, 1% or 0.01 say".into())

@@ -9,6 +9,7 @@ use crate::gonio::effects::footprint::Footprint;
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::reduce::saturation_limit;
+use crate::measurement::Dimension;
 
 /// A model's value and its derivatives.
 pub(super) struct Model {
@@ -57,7 +58,7 @@ pub(super) struct Noise<'a> {
 impl<'a> Noise<'a> {
     pub fn of(instrument: &'a Instrument) -> Self {
         let fixed = instrument.read_noise.powi(2) + step(&instrument.detector).powi(2) / 12.0;
-        Self { instrument, footprint: Footprint::of(instrument), fixed }
+        Self { instrument, footprint: Footprint::of(instrument, Dimension::Space), fixed }
     }
 
     /// Variance of f from the readings of one row (all its repeats), by photons, dark current, stray light and electronics, in the longest exposure

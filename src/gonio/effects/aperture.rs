@@ -8,5 +8,6 @@ use super::{Entry, stated};
 pub(super) const EFFECT: Entry = Entry {
     name: "detector aperture",
     calls: |i, _| stated(i.detector.aperture_deg, "detector.aperture_deg", "°"),
+    remove: |i| i.detector.aperture_deg = 0.0,
     make: |_| None,
 };

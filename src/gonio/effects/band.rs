@@ -8,6 +8,7 @@ use crate::numeric::quadrature::integrate;
 
 pub(super) const EFFECT: Entry = Entry {
     name: "spectral band",
+    remove: |i| i.source.bandwidth_nm = 0.0,
     calls: |i, channels| {
         let why = stated(i.source.bandwidth_nm, "source.bandwidth_nm", " nm")?;
         wavelengths(channels)

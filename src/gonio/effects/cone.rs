@@ -1,16 +1,24 @@
 //! Means over cones of directions: what a source of some size lights and an aperture takes in.
 //!
 //! Directions are even in solid angle within a half angle α: 1 − cosγ = u (1 − cosα) with u even in [0, 1]. The rule is Gauss–Legendre in u times
-//! equal steps in azimuth, exact for polynomials of degree 2m − 1 in the plane across; m doubles until the mean moves by no more than asked.
+//! equal steps in azimuth, exact for polynomials of degree 2m − 1 in the plane across; m doubles until the mean moves by no more than asked. So
+//! that a narrow lobe does not fall between the directions of low orders, the lobe's width is felt for at the mirror direction first.
+
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
+use crate::geometry::angles::angle_between;
 use crate::geometry::frame::Frame;
+use crate::geometry::mirror;
 use crate::measurement::Dimension;
 use crate::numeric::quadrature::gauss_legendre;
 
-/// Largest m.
-const FINEST: usize = 32;
+/// Largest m for any reading, and where a peak needs it.
+const USUAL: usize = 32;
+const FINEST: usize = 512;
+/// A peak matters for cones whose middle is this many times their reach from it, at most.
+const NEAR: f64 = 2.0;
 
 /// The rule of order m: directions about +z of a cone of half angle `alpha`, and their weights, which add up to 1.
 fn rule(m: usize, alpha: f64) -> Vec<(DVec3, f64)> {
@@ -53,24 +61,59 @@ fn frame_about(w: DVec3, dimension: Dimension) -> Frame {
     }
 }
 
+/// Directions of both cones, the source's and the detector's, with their weights.
+type Rules = [Vec<(DVec3, f64)>; 2];
+
 /// Rules of both cones by order.
 pub(in crate::gonio) struct Cones {
-    /// For m = 1, 2, 4, …: the source's and the detector's.
-    rules: Vec<[Vec<(DVec3, f64)>; 2]>,
+    /// Half angles of the source's and the detector's, rad.
+    half: [f64; 2],
+    /// For m = 1, 2, 4, …, made when they are first asked for.
+    rules: Vec<OnceLock<Rules>>,
+    /// Levels that any reading may take; the rest is for those that a peak needs.
+    usual: usize,
     accuracy: f64,
     dimension: Dimension,
 }
 
+/// Directions that one rule of both cones may have: for any reading, and where a peak needs them.
+const MANY: usize = 300_000;
+const MOST: usize = 5_000_000;
+
 impl Cones {
     /// Rules for half angles `source` and `detector` (rad), for means as good as `accuracy` (relative).
     pub fn new(source: f64, detector: f64, accuracy: f64, dimension: Dimension) -> Self {
-        let rule = if dimension == Dimension::Flat { flat_rule } else { rule };
-        let orders = std::iter::successors(Some(1), |m| (2 * m <= FINEST).then_some(2 * m));
-        Self { rules: orders.map(|m| [rule(m, source), rule(m, detector)]).collect(), accuracy, dimension }
+        let mut cones = Self { half: [source, detector], rules: Vec::new(), usual: 0, accuracy, dimension };
+        let levels = |m: usize, most: usize| {
+            (0..usize::BITS as usize).take_while(|level| 1 << level <= m && cones.size(*level) <= most).count()
+        };
+        let (all, usual) = (levels(FINEST, MOST), levels(USUAL, MANY));
+        cones.rules = (0..all).map(|_| OnceLock::new()).collect();
+        cones.usual = usual;
+        cones
     }
 
-    /// Writes the mean of `f`, all channels, over both cones about (wi, wo), and returns the largest relative change that the last doubling
-    /// brought. `f` adds its values times a weight.
+    /// Orders of both cones' rules at a level: as fine in angle.
+    fn orders(&self, level: usize) -> [usize; 2] {
+        let largest = self.half[0].max(self.half[1]);
+        self.half.map(|half| ((f64::from(1u32 << level) * half / largest).ceil() as usize).max(1))
+    }
+
+    /// Pairs of directions at a level.
+    fn size(&self, level: usize) -> usize {
+        let one = |m: usize| if self.dimension == Dimension::Flat { 2 * m } else { m * (2 * m + 2) };
+        let of = |(m, half): (usize, f64)| if half == 0.0 { 1 } else { one(m) };
+        self.orders(level).into_iter().zip(self.half).map(of).product()
+    }
+
+    fn rules(&self, level: usize) -> &Rules {
+        let rule = if self.dimension == Dimension::Flat { flat_rule } else { rule };
+        let orders = self.orders(level);
+        self.rules[level].get_or_init(|| [0, 1].map(|k| rule(orders[k], self.half[k])))
+    }
+
+    /// Writes the mean of `f`, all channels, over both cones about (wi, wo), and returns by which share it may be off: the largest relative change
+    /// that the last doubling brought. `f` adds its values times a weight.
     pub fn mean(
         &self,
         wi: DVec3,
@@ -78,27 +121,85 @@ impl Cones {
         f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
         out: &mut [f64],
     ) -> f64 {
-        let (about_i, about_o) = (frame_about(wi, self.dimension), frame_about(wo, self.dimension));
+        let about = (frame_about(wi, self.dimension), frame_about(wo, self.dimension));
         let mut before = vec![0.0; out.len()];
+        let last = self.rules.len() - 1;
+        let needed = self.peak(wi, wo, f, out).map_or(0, |width| self.level_for(width));
+        // Two levels at least: their difference is what is known of the error.
+        let (first, end) = (needed.min(last.saturating_sub(1)), (needed + 2).max(self.usual - 1).min(last));
         let mut change = f64::INFINITY;
-        for (level, [source, detector]) in self.rules.iter().enumerate() {
-            out.fill(0.0);
-            for (i, w_i) in source {
-                let i = about_i.to_world(*i);
-                for (o, w_o) in detector {
-                    f(i, about_o.to_world(*o), w_i * w_o, out);
+        for level in first..=end {
+            self.sum(level, &about, f, out);
+            if level > first {
+                change = out.iter().zip(&before).map(|(new, old)| moved(*new, *old)).fold(0.0, f64::max);
+                if change.is_nan() || change <= self.accuracy {
+                    break;
                 }
-            }
-            let moved =
-                |(new, old): (&f64, &f64)| if new == old { 0.0 } else { (new - old).abs() / new.abs().max(old.abs()) };
-            change = out.iter().zip(&before).map(moved).fold(0.0, f64::max);
-            if level > 0 && (change.is_nan() || change <= self.accuracy) {
-                break;
             }
             before.copy_from_slice(out);
         }
-        change
+        // A peak between the directions of the finest rule is not known at all.
+        if needed > last { change.max(1.0) } else { change }
     }
+
+    /// The mean by the rules of one level.
+    fn sum(
+        &self,
+        level: usize,
+        about: &(Frame, Frame),
+        f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
+        out: &mut [f64],
+    ) {
+        let [source, detector] = self.rules(level);
+        out.fill(0.0);
+        for (i, w_i) in source {
+            let i = about.0.to_world(*i);
+            for (o, w_o) in detector {
+                f(i, about.1.to_world(*o), w_i * w_o, out);
+            }
+        }
+    }
+
+    /// Half width (rad), within a factor of two, of a peak about the mirror direction that the cones reach and low orders might miss between
+    /// their directions. Nothing is known of other peaks.
+    fn peak(
+        &self,
+        wi: DVec3,
+        wo: DVec3,
+        f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
+        scratch: &mut [f64],
+    ) -> Option<f64> {
+        let (top, reach) = (mirror(wi), self.half[0] + self.half[1]);
+        if angle_between(top, wo) > NEAR * reach {
+            return None;
+        }
+        let frame = frame_about(top, self.dimension);
+        // Across the plane of incidence, where lobes are narrowest; in the flat world there is no such way.
+        let across = if self.dimension == Dimension::Flat {
+            frame.tangent
+        } else {
+            DVec3::Z.cross(top).try_normalize().unwrap_or(frame.tangent)
+        };
+        let mut at = |angle: f64| {
+            scratch.fill(0.0);
+            f(wi, top * angle.cos() + across * angle.sin(), 1.0, scratch);
+            scratch.iter().copied().fold(0.0, f64::max)
+        };
+        let (foot, peak) = (at(reach), at(0.0));
+        let half = 0.5 * (foot + peak);
+        (peak > foot).then(|| (1..=40).map(|k| reach * 0.5f64.powi(k)).find(|angle| at(*angle) >= half)).flatten()
+    }
+
+    /// The level whose outer directions are no farther apart than three half widths, so that doubling shows what is missing.
+    fn level_for(&self, width: f64) -> usize {
+        let m = 2.0 * self.half[0].max(self.half[1]) / width;
+        m.max(1.0).log2().ceil() as usize
+    }
+}
+
+/// Relative change between two values.
+fn moved(new: f64, old: f64) -> f64 {
+    if new == old { 0.0 } else { (new - old).abs() / new.abs().max(old.abs()) }
 }
 
 #[cfg(test)]

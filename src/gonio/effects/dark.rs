@@ -9,6 +9,7 @@ pub(super) const EFFECT: Entry = Entry {
         let said = format!("detector.dark_per_s = {mean}, dark_drift_per_sqrt_hour = {drift}");
         if i.has_dark() { Ok(said) } else { Err(said) }
     },
+    remove: |i| (i.detector.dark_per_s, i.detector.dark_drift_per_sqrt_hour) = (0.0, 0.0),
     make: |maker: &Maker<'_>| {
         Some(Box::new(Dark { mean: maker.instrument.detector.dark_per_s, walk: &maker.actual.dark }))
     },

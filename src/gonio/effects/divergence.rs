@@ -7,5 +7,6 @@ use super::{Entry, stated};
 pub(super) const EFFECT: Entry = Entry {
     name: "source divergence",
     calls: |i, _| stated(i.source.divergence_deg, "source.divergence_deg", "°"),
+    remove: |i| i.source.divergence_deg = 0.0,
     make: |_| None,
 };

@@ -21,6 +21,7 @@ pub(super) const EFFECT: Entry = Entry {
         }
         what => Ok(format!("a beam of {} m on {what}", i.source.beam_diameter_m)),
     },
+    remove: |i| i.source.beam_diameter_m = 0.0,
     make: |maker: &Maker<'_>| Footprint::of(maker.instrument, maker.dimension).map(|f| Box::new(f) as Box<dyn Pass>),
 };
 
@@ -67,6 +68,9 @@ impl Footprint {
             return (wi.z * length / self.beam).min(1.0);
         }
         let outlines = [Outline::across(wi, self.beam), Outline::disc(self.sample), Outline::across(wo, self.field)];
+        if outlines[1..].iter().all(|edge| outlines[0].lies_within(edge)) {
+            return 1.0; // exactly, as without edges
+        }
         let mut ends: Vec<f64> = vec![0.0, PI];
         for (a, b) in [(0, 1), (0, 2), (1, 2)] {
             ends.extend(outlines[a].crossings(&outlines[b]));
@@ -127,6 +131,11 @@ impl Outline {
         }
         let (towards, away) = (sin.atan2(cos), (-mean / size).acos());
         [towards + away, towards - away].map(|twice| 0.5 * twice.rem_euclid(TAU)).to_vec()
+    }
+
+    /// Whether nothing of it is outside of the other.
+    fn lies_within(&self, other: &Self) -> bool {
+        self.inverse_square(0.0) >= other.inverse_square(0.0) && self.crossings(other).is_empty()
     }
 
     /// ½∫ r² dφ: 1/(2√(uv)) times what the ellipse's own angle, tan⁻¹(√(v/u) tan(φ − φ₀)), advances by.

@@ -15,6 +15,7 @@ pub(super) const EFFECT: Entry = Entry {
         stated(i.sample.height_u_m, "sample.height_u_m", " m")
             .and_then(|why| if seen { Ok(why) } else { Err("source and detector are far away".into()) })
     },
+    remove: |i| i.sample.height_u_m = 0.0,
     make: |maker: &Maker<'_>| {
         let (source, detector) = (maker.instrument.source.distance_m, maker.instrument.detector.distance_m);
         Some(Box::new(Height { above: maker.actual.height_m, source, detector, dimension: maker.dimension }))

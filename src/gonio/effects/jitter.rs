@@ -10,6 +10,7 @@ use crate::numeric::random::{Purpose, stream};
 pub(super) const EFFECT: Entry = Entry {
     name: "axis jitter",
     calls: |i, _| stated(i.axes.jitter_deg, "axes.jitter_deg", "°"),
+    remove: |i| i.axes.jitter_deg = 0.0,
     make: |maker: &Maker<'_>| {
         let sigma = maker.instrument.axes.jitter_deg.to_radians();
         Some(Box::new(Jitter { seed: maker.seed, sigma, is_flat: maker.dimension == Dimension::Flat }))

@@ -33,6 +33,7 @@ use crate::control::Plan;
 use crate::measurement::Dimension;
 
 /// Some readings in a row, on their way from directions to electrons.
+#[derive(Clone)]
 pub(super) struct Block<'a> {
     /// Index of the first in the series.
     pub first: usize,
@@ -88,6 +89,8 @@ struct Entry {
     name: &'static str,
     /// `Ok` with the reason for it, `Err` with that against it.
     calls: fn(&Instrument, &[String]) -> Result<String, String>,
+    /// Makes an instrument one without it.
+    remove: fn(&mut Instrument),
     /// Its pass, where it has one of its own.
     make: for<'a> fn(&Maker<'a>) -> Option<Box<dyn Pass + 'a>>,
 }
@@ -118,13 +121,43 @@ pub fn plan(instrument: &Instrument, channels: &[String]) -> Plan {
     plan
 }
 
+/// Effects by chance, anew in every reading: what they do is a standard deviation.
+pub(super) const NOISE: [&str; 3] = [shot::EFFECT.name, read_noise::EFFECT.name, quantisation::EFFECT.name];
+/// The two passes that every reading takes.
+pub(super) const LIGHT: &str = "light";
+pub(super) const EXPOSURE: &str = "exposure";
+
+/// Whether the light itself must be worked out anew to tell what the effect does.
+pub(super) fn turns_light(name: &str) -> bool {
+    GEOMETRY.iter().any(|e| e.name == name)
+}
+
+/// Whether the effect is one of the means over cones, which have no pass of their own.
+pub(super) fn is_cone(name: &str) -> bool {
+    [divergence::EFFECT.name, aperture::EFFECT.name].contains(&name)
+}
+
+/// The instrument without an effect's cause.
+pub(super) fn without(instrument: &Instrument, name: &str) -> Instrument {
+    let mut less = instrument.clone();
+    effects().filter(|e| e.name == name).for_each(|e| (e.remove)(&mut less));
+    less
+}
+
+/// A pass and the effect's name.
+pub(super) struct Step<'a> {
+    pub name: &'static str,
+    pub pass: Box<dyn Pass + 'a>,
+}
+
 /// The passes of those effects that are on, and not left out by name, among the two that every reading takes: the light and the exposure.
-pub(super) fn passes<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Vec<Box<dyn Pass + 'a>> {
+pub(super) fn passes<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Vec<Step<'a>> {
     let on = |e: &&Entry| (e.calls)(maker.instrument, maker.channels).is_ok() && !left_out.contains(&e.name);
-    let of = |list: &'static [Entry]| list.iter().filter(on).filter_map(|e| (e.make)(maker)).collect::<Vec<_>>();
+    let step = |e: &Entry| (e.make)(maker).map(|pass| Step { name: e.name, pass });
+    let of = |list: &'static [Entry]| list.iter().filter(on).filter_map(step).collect::<Vec<_>>();
     let [geometry, flux, detector] = [of(&GEOMETRY), of(&FLUX), of(&DETECTOR)];
-    let light: Box<dyn Pass + 'a> = light::pass(maker, left_out);
-    let exposure: Box<dyn Pass + 'a> = Box::new(light::Exposure);
+    let light = Step { name: LIGHT, pass: light::pass(maker, left_out) };
+    let exposure = Step { name: EXPOSURE, pass: Box::new(light::Exposure) };
     geometry.into_iter().chain([light]).chain(flux).chain([exposure]).chain(detector).collect()
 }
 

@@ -5,6 +5,7 @@ use super::{Block, Entry, Maker, Pass, stated};
 pub(super) const EFFECT: Entry = Entry {
     name: "nonlinearity",
     calls: |i, _| stated(i.detector.nonlinearity_u, "detector.nonlinearity_u", ""),
+    remove: |i| i.detector.nonlinearity_u = 0.0,
     make: |maker: &Maker<'_>| {
         Some(Box::new(Nonlinearity { error: maker.actual.nonlinearity / maker.instrument.detector.full_well }))
     },

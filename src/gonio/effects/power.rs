@@ -5,6 +5,7 @@ use super::{Block, Entry, Maker, Pass, stated};
 pub(super) const EFFECT: Entry = Entry {
     name: "source drift",
     calls: |i, _| stated(i.source.drift_per_sqrt_hour, "source.drift_per_sqrt_hour", ""),
+    remove: |i| i.source.drift_per_sqrt_hour = 0.0,
     make: |maker: &Maker<'_>| {
         let power = &maker.actual.power[..];
         (!power.is_empty()).then(|| Box::new(Power(power)) as Box<dyn Pass>)

@@ -11,6 +11,7 @@ pub(super) const EFFECT: Entry = Entry {
         0 => Err("detector.bits = 0".into()),
         bits => Ok(format!("detector.bits = {bits}: steps of {:.3} electrons", step(&i.detector))),
     },
+    remove: |i| i.detector.bits = 0,
     make: |maker: &Maker<'_>| {
         let detector = &maker.instrument.detector;
         Some(Box::new(Quantisation { step: step(detector), most: detector.full_well }))

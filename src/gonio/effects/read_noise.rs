@@ -9,6 +9,7 @@ pub(super) const EFFECT: Entry = Entry {
         Ok(_) if !i.is_noisy() => Err("electrons = 0".into()),
         said => said,
     },
+    remove: |i| i.read_noise = 0.0,
     make: |maker: &Maker<'_>| Some(Box::new(ReadNoise { sigma: maker.instrument.read_noise, seed: maker.seed })),
 };
 

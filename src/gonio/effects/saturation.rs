@@ -5,6 +5,7 @@ use super::{Block, Entry, Maker, Pass, stated};
 pub(super) const EFFECT: Entry = Entry {
     name: "saturation",
     calls: |i, _| stated(i.detector.full_well, "detector.full_well", " electrons"),
+    remove: |i| (i.detector.full_well, i.detector.bits, i.detector.nonlinearity_u) = (0.0, 0, 0.0),
     make: |maker: &Maker<'_>| Some(Box::new(Saturation(maker.instrument.detector.full_well))),
 };
 

@@ -10,6 +10,7 @@ use crate::gonio::reading::Kind;
 pub(super) const EFFECT: Entry = Entry {
     name: "shadow",
     calls: |i, _| stated(i.surroundings.shadow_deg, "surroundings.shadow_deg", "°"),
+    remove: |i| i.surroundings.shadow_deg = 0.0,
     make: |maker: &Maker<'_>| Some(Box::new(Shadow(maker.instrument.surroundings.shadow_deg.to_radians()))),
 };
 

@@ -6,6 +6,7 @@ use crate::gonio::instrument::shot;
 pub(super) const EFFECT: Entry = Entry {
     name: "shot noise",
     calls: |i, _| if i.is_noisy() { Ok(format!("electrons = {}", i.electrons)) } else { Err("electrons = 0".into()) },
+    remove: |i| (i.electrons, i.read_noise) = (0.0, 0.0),
     make: |maker: &Maker<'_>| Some(Box::new(Shot { seed: maker.seed })),
 };
 

@@ -6,6 +6,7 @@ use crate::gonio::reading::Kind;
 pub(super) const EFFECT: Entry = Entry {
     name: "stray light",
     calls: |i, _| stated(i.surroundings.stray_per_sr, "surroundings.stray_per_sr", " 1/sr"),
+    remove: |i| i.surroundings.stray_per_sr = 0.0,
     make: |maker: &Maker<'_>| {
         Some(Box::new(Stray(maker.instrument.gain() * maker.instrument.surroundings.stray_per_sr)))
     },

@@ -7,6 +7,7 @@ use super::{Block, Entry, Maker, Pass, stated};
 pub(super) const EFFECT: Entry = Entry {
     name: "sample tilt",
     calls: |i, _| stated(i.sample.tilt_u_deg, "sample.tilt_u_deg", "°"),
+    remove: |i| i.sample.tilt_u_deg = 0.0,
     make: |maker: &Maker<'_>| Some(Box::new(Tilt(frame(maker.actual.tilt)))),
 };
 

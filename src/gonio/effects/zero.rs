@@ -8,6 +8,7 @@ use crate::geometry::angles::turned;
 pub(super) const EFFECT: Entry = Entry {
     name: "axis zeros",
     calls: |i, _| stated(i.axes.zero_u_deg, "axes.zero_u_deg", "°"),
+    remove: |i| i.axes.zero_u_deg = 0.0,
     make: |maker: &Maker<'_>| Some(Box::new(Zeros(maker.actual.zeros))),
 };
 

@@ -1,0 +1,117 @@
+//! `goniofit effects`: which effects a simulation calls for, why, what each costs, and how far readings would be off without it.
+
+use std::fmt::Write as _;
+
+use serde_json::json;
+
+use super::failure::Failure;
+use super::simulation::{Plan, What};
+use super::ui::Ui;
+use crate::chain;
+use crate::gonio::{Change, Contribution, Contributions};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit effects lab.toml --material satin --scan in-plane:5
+  goniofit effects --instrument lab.toml --material gold.json --json")]
+pub(super) struct Args {
+    #[command(flatten)]
+    what: What,
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let plan = Plan::new(&args.what, None)?;
+    let (source, name) = plan.load()?;
+    let found = chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, |job| {
+        job.contributions(ui.control())
+    })?;
+    let object = json!({
+        "material": plan.material, "scan": plan.scan.to_string(), "seed": plan.seed, "readings": found.readings,
+        "seconds": found.seconds, "quadrature_error": found.quadrature_error, "effects": found.effects,
+    });
+    ui.result(&table(&plan, &found), &object);
+    Ok(())
+}
+
+/// Effects that are on with their numbers, then those that are off with the reason; no wider than 100 columns.
+fn table(plan: &Plan, found: &Contributions) -> String {
+    let mut text = format!(
+        "{} along {}, seed {}: {} readings, {:.3} s of processor time",
+        plan.material, plan.scan, plan.seed, found.readings, found.seconds
+    );
+    if found.quadrature_error > 0.0 {
+        let _ = write!(text, ", means over cones to {:.1e}", found.quadrature_error);
+    }
+    let (on, off): (Vec<&Contribution>, Vec<&Contribution>) = found.effects.iter().partition(|e| e.on);
+    let _ = write!(
+        text,
+        "\n\n{:18} {:>6}  {:^19}  {:^19}  because of\n{:18} {:>6}  {:>9} {:>9}  {:>9} {:>9}",
+        "without it", "time", "readings change by", "reduced, by", "", "", "largest", "rms", "largest", "rms"
+    );
+    for effect in &on {
+        row(&mut text, effect);
+    }
+    if on.is_empty() {
+        text.push_str("\n(none)");
+    }
+    text.push_str("\n\noff:");
+    for effect in off {
+        let _ = write!(text, "\n{:18} {}", effect.effect, effect.why);
+    }
+    text
+}
+
+fn row(text: &mut String, effect: &Contribution) {
+    let numbers = |change: Option<Change>| {
+        change.map_or([String::from("–"), "–".into()], |c| [share(c.largest), share(c.rms)])
+    };
+    let [largest, rms] = numbers(effect.reading);
+    let [of_reduced, rms_reduced] = numbers(effect.reduced);
+    let time = format!("{:.1} %", 100.0 * effect.share);
+    let mut why = match effect.masked {
+        0 => effect.why.clone(),
+        n => format!("{} ({n} values masked)", effect.why),
+    };
+    if effect.noise {
+        why = format!("σ: {why}");
+    }
+    let mut lines = wrapped(&why, WIDTH - WHY).into_iter();
+    let _ = write!(
+        text,
+        "\n{:18} {time:>6}  {largest:>9} {rms:>9}  {of_reduced:>9} {rms_reduced:>9}  {}",
+        effect.effect,
+        lines.next().unwrap_or_default()
+    );
+    for line in lines {
+        let _ = write!(text, "\n{:WHY$}{line}", "");
+    }
+}
+
+/// Columns of the terminal, and where the reason begins.
+const WIDTH: usize = 100;
+const WHY: usize = 69;
+
+/// Words in lines of at most so many characters; a longer word has its own.
+fn wrapped(words: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in words.split(' ') {
+        let line = lines.last().map_or(0, |l| l.chars().count());
+        match lines.last_mut() {
+            Some(last) if line == 0 || line + 1 + word.chars().count() <= width => {
+                last.push_str(if line == 0 { "" } else { " " });
+                last.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// A share in per cent.
+fn share(of: f64) -> String {
+    match 100.0 * of {
+        0.0 => "0".into(),
+        p if p < 0.001 => format!("{p:.0e} %"),
+        p => format!("{p:.3} %"),
+    }
+}

@@ -1,0 +1,65 @@
+//! Which accuracy a time allows: the cost of means over source and aperture, predicted from some of the readings.
+
+use std::time::{Duration, Instant};
+
+use super::forward::Job;
+use crate::control::Control;
+use crate::numeric::sum::BLOCK;
+
+/// Readings that are tried.
+const TRIED: usize = 256;
+/// Share of the time that trials may take.
+const TRIALS: f64 = 0.2;
+/// Accuracies that are tried, each a step finer; the first takes the lowest orders that there are.
+const COARSEST: f64 = 0.3;
+const STEP: f64 = 0.1f64;
+const FINEST: f64 = 1e-12;
+
+/// What a time allows.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Affordable {
+    /// Relative error that means over source and aperture may have.
+    pub accuracy: f64,
+    /// Seconds that all readings are predicted to take with it.
+    pub predicted_s: f64,
+    /// Whether they fit; if not, the accuracy is the coarsest.
+    pub fits: bool,
+}
+
+impl Job<'_> {
+    /// The best accuracy with which all readings fit into `time`, less what the trials took.
+    #[must_use]
+    pub fn affordable(&self, time: Duration) -> Affordable {
+        let clock = Instant::now();
+        let budget = time.as_secs_f64();
+        let (readings, actual) = self.prepare();
+        let every = readings.len().div_ceil(TRIED).max(1);
+        let some: Vec<_> = readings.iter().step_by(every).copied().collect();
+        let predict = |accuracy: f64| {
+            let trial = Job { accuracy, ..*self };
+            let start = Instant::now();
+            let read = trial.read(some.clone(), &actual, Control::silent());
+            let each = start.elapsed().as_secs_f64() / read.readings.len().max(1) as f64;
+            each * in_a_row(readings.len())
+        };
+        let mut best = Affordable { accuracy: COARSEST, predicted_s: predict(COARSEST), fits: false };
+        best.fits = best.predicted_s + clock.elapsed().as_secs_f64() <= budget;
+        let mut accuracy = COARSEST * STEP;
+        while best.fits && accuracy >= FINEST && clock.elapsed().as_secs_f64() < TRIALS * budget {
+            let predicted_s = predict(accuracy);
+            if predicted_s + clock.elapsed().as_secs_f64() > budget {
+                break;
+            }
+            best = Affordable { accuracy, predicted_s, fits: true };
+            accuracy *= STEP;
+        }
+        best
+    }
+}
+
+/// Readings that one thread makes in a row: blocks are shared out whole.
+fn in_a_row(readings: usize) -> f64 {
+    let blocks = readings.div_ceil(BLOCK);
+    let threads = rayon::current_num_threads().max(1);
+    readings.min(blocks.div_ceil(threads) * BLOCK) as f64
+}

@@ -1,0 +1,137 @@
+//! The plan of effects of a simulation, and simulations that are told how exact to be.
+
+use serde_json::Value;
+
+use crate::bench::{Bench, number};
+
+/// Every kind of effect: of the geometry, of the flux, of the detector, of chance.
+const LAB: &str = "version = 1
+material = \"satin\"
+scan = \"in-plane:10\"
+seed = 3
+[instrument]
+electrons = 1e6
+[instrument.source]
+drift_per_sqrt_hour = 0.005
+beam_diameter_m = 0.01
+[instrument.sample]
+diameter_m = 0.02
+tilt_u_deg = 1e-7
+[instrument.detector]
+aperture_deg = 1
+dark_per_s = 200
+full_well = 4e5
+bits = 16
+nonlinearity_u = 0.003
+exposures_s = [0.02, 0.5]
+[instrument.reference]
+reflectance = 0.985
+[instrument.surroundings]
+stray_per_sr = 1e-3
+shadow_deg = 3
+";
+
+fn bench() -> Bench {
+    let b = Bench::new();
+    b.write("lab.toml", LAB);
+    b
+}
+
+fn effect<'a>(said: &'a Value, name: &str) -> &'a Value {
+    let list = said["effects"].as_array().expect("a list");
+    list.iter().find(|e| e["effect"] == name).unwrap_or_else(|| panic!("{name}: {list:?}"))
+}
+
+#[test]
+fn every_effect_is_listed_with_its_reason_and_what_it_changes() {
+    let said = bench().json(&["effects", "lab.toml"]);
+    assert_eq!(said["effects"].as_array().map(Vec::len), Some(16));
+    for (name, on) in
+        [("detector aperture", true), ("sample tilt", true), ("source divergence", false), ("read noise", true)]
+    {
+        assert_eq!(effect(&said, name)["on"], on, "{name}");
+        assert_eq!(effect(&said, name)["reading"].is_object(), on, "{name}");
+    }
+    assert!(effect(&said, "detector aperture")["why"].as_str().expect("text").contains("aperture_deg = 1°"));
+    let largest = |name: &str| number(&effect(&said, name)["reading"]["largest"]);
+    // What saturates is cut by more than its half: the longer exposure takes 25 times the shorter's electrons.
+    assert!(largest("saturation") > 0.0 && largest("shadow") == 1.0);
+    // A tilt of 10⁻⁷ degrees moves readings of this material by some 10⁻⁸.
+    assert!((1e-12..1e-6).contains(&largest("sample tilt")), "{}", largest("sample tilt"));
+    // The reduction subtracts the dark and the stray light, and divides by the share of the beam.
+    for name in ["dark current", "stray light", "footprint"] {
+        let reduced = number(&effect(&said, name)["reduced"]["largest"]);
+        assert!(largest(name) > 1e-4 && reduced < 1e-9, "{name}: {} {reduced}", largest(name));
+    }
+    assert!(number(&effect(&said, "detector aperture")["reduced"]["largest"]) > 1e-5);
+    assert!(number(&effect(&said, "shadow")["masked"]) > 0.0);
+    assert_eq!(effect(&said, "shot noise")["noise"], true);
+    let shares: f64 = said["effects"].as_array().expect("a list").iter().map(|e| number(&e["share"])).sum();
+    assert!(shares > 0.0 && shares <= 1.0 + 1e-9, "{shares}");
+}
+
+#[test]
+fn the_table_fits_a_terminal_and_an_ideal_instrument_has_no_effect() {
+    let b = bench();
+    let text = b.ok(&["effects", "lab.toml"]).text();
+    assert!(text.lines().all(|l| l.chars().count() <= 100), "{text}");
+    assert!(text.contains("detector aperture") && text.contains("off:"));
+    let said = b.json(&["effects", "--material", "satin", "--noiseless", "--scan", "in-plane:15"]);
+    assert!(said["effects"].as_array().expect("a list").iter().all(|e| e["on"] == false));
+}
+
+#[test]
+fn what_is_no_simulation_is_said_to_be_none() {
+    let b = bench();
+    b.write("scene.toml", b.ok(&["scenes", "sphere", "--toml"]).out);
+    b.write("colour.toml", format!("colour = 3\n{LAB}"));
+    for (args, says) in [
+        (&["effects", "scene.toml"][..], "found a scene"),
+        (&["effects", "colour.toml"], "colour"),
+        (&["effects", "none.toml"], "none.toml"),
+        (&["effects"], "--material"),
+        (&["effects", "--material", "satin", "--instrument", "scene.toml"], "found a scene"),
+    ] {
+        let ran = b.run(args);
+        assert!(ran.code == Some(2) && ran.err.contains(says), "{args:?}: {}", ran.err);
+    }
+}
+
+#[test]
+fn what_a_tolerance_leaves_out_is_named_and_below_it_nothing_changes() {
+    let b = bench();
+    b.ok(&["simulate", "lab.toml", "--out", "all.csv"]);
+    let said = b.json(&["simulate", "lab.toml", "--auto", "1e-5", "--out", "few.csv"]);
+    let left: Vec<&str> =
+        said["left_out"].as_array().expect("a list").iter().filter_map(|e| e["effect"].as_str()).collect();
+    assert_eq!(left, ["sample tilt"]);
+    let off = said["effects"].as_array().expect("a list").iter().find(|e| e["name"] == "sample tilt").expect("it");
+    assert!(off["on"] == false && off["why"].as_str().expect("text").contains("at most"), "{off}");
+    let none = b.json(&["simulate", "lab.toml", "--auto", "1e-12", "--out", "same.csv"]);
+    assert_eq!(none["left_out"].as_array().map(Vec::len), Some(0));
+    assert_eq!(b.bytes("same.csv"), b.bytes("all.csv"));
+}
+
+#[test]
+fn targets_and_times_say_what_was_reached() {
+    let b = bench();
+    let reached = |extra: &[&str]| {
+        let said = b.json(&[&["simulate", "lab.toml", "--out", "m.csv"], extra].concat());
+        (number(&said["quadrature_error"]), said)
+    };
+    let (usual, _) = reached(&[]);
+    let (coarse, _) = reached(&["--target-error", "1%"]);
+    let (fine, _) = reached(&["--target-error", "1e-9"]);
+    assert!(usual <= 1e-6 && coarse <= 1e-2 && fine <= 1e-9 && coarse > fine, "{usual} {coarse} {fine}");
+    let (_, timed) = reached(&["--time-budget", "1h"]);
+    assert_eq!(timed["time_budget"]["fits"], true);
+    let short = b.ok(&["simulate", "lab.toml", "--out", "m.csv", "--time-budget", "1ns"]);
+    assert!(short.err.contains("even the lowest orders"), "{}", short.err);
+    for wrong in [&["--target-error", "0"][..], &["--time-budget", "0s"], &["--auto", "-1"]] {
+        assert_eq!(b.run(&[&["simulate", "lab.toml", "--out", "m.csv"], wrong].concat()).code, Some(2), "{wrong:?}");
+    }
+    assert_eq!(
+        b.run(&["simulate", "lab.toml", "--out", "m.csv", "--target-error", "1%", "--time-budget", "1s"]).code,
+        Some(2)
+    );
+}

@@ -1,0 +1,139 @@
+//! Means over cones: the error that is stated is no smaller than the true one, however sharp the lobe.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::DVec3;
+use goniofit::control::Control;
+use goniofit::geometry::angles::angle_between;
+use goniofit::geometry::{direction, mirror};
+use goniofit::gonio::parts::{Detector, Source};
+use goniofit::gonio::{Instrument, Job};
+use goniofit::measurement::{Directions, Weights};
+use goniofit::numeric::quadrature::integrate;
+use goniofit::numeric::random::{Purpose, RngExt, stream};
+
+use crate::support::*;
+
+/// A lobe over Lambert, one pair of directions, and a cone of the detector or of the source.
+#[derive(Debug)]
+struct Case {
+    exponent: f64,
+    kd: f64,
+    wi: DVec3,
+    wo: DVec3,
+    full_deg: f64,
+    of_source: bool,
+}
+
+const KS: f64 = 0.2;
+
+impl Case {
+    /// Exponents 10 to 10⁶, cones of 0.1° to 3°, detectors up to one and a half cones from the mirror direction, all of the cone above the horizon.
+    fn random(index: u64) -> Self {
+        let rng = &mut stream(1, Purpose::Study, index);
+        let mut uniform = |a: f64, b: f64| a + (b - a) * rng.random::<f64>();
+        let full_deg = 0.1 * 30f64.powf(uniform(0.0, 1.0));
+        let wi = direction(uniform(0.0, 1.2), uniform(0.0, TAU));
+        let aside = uniform(0.0, 1.5) * full_deg.to_radians();
+        let frame = goniofit::geometry::frame::Frame::from_normal(mirror(wi));
+        let wo = frame.to_world(direction(aside, uniform(0.0, TAU)));
+        Self {
+            exponent: 10f64.powf(uniform(1.0, 6.0)),
+            kd: uniform(0.0, 0.5),
+            wi,
+            wo,
+            full_deg,
+            of_source: index % 2 == 1,
+        }
+    }
+
+    /// Mean of f·cosθo. About the lobe's middle, at D from the cone's, a circle of radius ρ lies in the cone for 2ψ, cosψ = (cosα − cosD cosρ)/(sinD
+    /// sinρ): one integral over ρ is left, whose ends like roots go with ρ = a + (b − a) sin²t.
+    fn mean(&self) -> f64 {
+        let alpha = 0.5 * self.full_deg.to_radians();
+        // The lobe is cosⁿ of the angle between the mirror direction and wo, and either of them is in the cone.
+        let (middle, axis) = if self.of_source { (self.wo, mirror(self.wi)) } else { (mirror(self.wi), self.wo) };
+        let apart = angle_between(middle, axis);
+        let towards = (axis - middle * middle.dot(axis)).normalize_or_zero();
+        let arc = |rho: f64| {
+            let cos = (alpha.cos() - apart.cos() * rho.cos()) / (apart.sin() * rho.sin());
+            if cos <= -1.0 { PI } else { cos.min(1.0).acos() }
+        };
+        let lobe = |rho: f64| {
+            let psi = arc(rho);
+            // Mean of cosθo over the arc.
+            let cos_o = if self.of_source {
+                self.wo.z
+            } else {
+                rho.cos() * middle.z + rho.sin() * towards.z * if psi > 0.0 { psi.sin() / psi } else { 1.0 }
+            };
+            let value = KS * (self.exponent + 2.0) / TAU * (self.exponent * rho.cos().ln()).exp();
+            value * cos_o * 2.0 * psi * rho.sin()
+        };
+        let piece = |a: f64, b: f64| {
+            let at = |t: f64| lobe(a + (b - a) * t.sin().powi(2)) * (b - a) * (2.0 * t).sin();
+            let ends: Vec<f64> = (0..=200).map(|k| FRAC_PI_2 * f64::from(k) / 200.0).collect();
+            ends.windows(2).map(|e| integrate(e[0], e[1], 16, at)).sum::<f64>()
+        };
+        let edge = (alpha - apart).abs();
+        let inner = if apart < alpha { piece(0.0, edge) } else { 0.0 };
+        let solid = TAU * 2.0 * (0.5 * alpha).sin().powi(2);
+        // An even cone's mean of cosθo is that of its axis times (1 + cosα)/2.
+        let lambert = self.kd / PI * self.wo.z * if self.of_source { 1.0 } else { (0.5 * alpha).cos().powi(2) };
+        (inner + piece(edge, alpha + apart)) / solid + lambert
+    }
+
+    /// The instrument's mean, and the error that it states.
+    fn read(&self, accuracy: f64) -> (f64, f64) {
+        let instrument = Instrument {
+            source: Source { divergence_deg: if self.of_source { self.full_deg } else { 0.0 }, ..Source::default() },
+            detector: Detector {
+                aperture_deg: if self.of_source { 0.0 } else { self.full_deg },
+                ..Detector::default()
+            },
+            ..Instrument::noiseless()
+        };
+        let scan = (Directions::List { wi: vec![self.wi], wo: vec![self.wo] }, Weights::Uniform);
+        let of = material(self.kd, KS, self.exponent);
+        let raw = with_job(&of, &instrument, &scan, 0, &[], |job| Job { accuracy, ..*job }.run(Control::silent()));
+        (raw.signal[0], raw.quadrature_error)
+    }
+}
+
+#[test]
+fn stated_errors_of_means_over_cones_hold_in_95_of_100_cases() {
+    for accuracy in [0.1, 1e-2, 1e-4, 1e-6] {
+        let (mut held, mut reached) = (0, 0);
+        for index in 0..100 {
+            let case = Case::random(index);
+            let (got, stated) = case.read(accuracy);
+            let off = (got / case.mean() - 1.0).abs();
+            // The reference is good to some 10⁻¹¹.
+            held += i32::from(off <= stated + 1e-10);
+            reached += i32::from(off <= accuracy);
+            if off > stated + 1e-10 {
+                println!("{accuracy:e}: off by {off:e}, stated {stated:e}: {case:?}");
+            }
+        }
+        println!("accuracy {accuracy:e}: stated errors hold in {held}, the accuracy is reached in {reached} of 100");
+        assert!(held >= 95 && reached >= 95, "{accuracy:e}: {held} {reached}");
+    }
+}
+
+/// A lobe of exponent 10⁵ and 10⁷ in an aperture of 3°: its width is 0.18° and 0.018°, and low orders would look beside it.
+#[test]
+fn a_lobe_much_narrower_than_the_aperture_is_not_missed() {
+    for exponent in [1e5, 1e6, 1e7] {
+        for aside in [0.0, 0.5, 1.2] {
+            let wi = direction(0.7, 0.0);
+            let frame = goniofit::geometry::frame::Frame::from_normal(mirror(wi));
+            let wo = frame.to_world(direction(f64::to_radians(aside), 0.3));
+            let case = Case { exponent, kd: 0.3, wi, wo, full_deg: 3.0, of_source: false };
+            let (got, stated) = case.read(1e-6);
+            let off = (got / case.mean() - 1.0).abs();
+            println!("n {exponent:e}, {aside}° aside: off by {off:e}, stated {stated:e}");
+            assert!(off <= stated + 1e-10, "{exponent:e} {aside}: {off:e} {stated:e}");
+            assert!(stated < 1e-3 || exponent > 1e6, "{exponent:e} {aside}: {stated:e}");
+        }
+    }
+}
