@@ -4,7 +4,7 @@ use crate::experiment::{CLASSES, Experiment, coverage, sigma};
 use crate::support::*;
 use goniofit::chain;
 use goniofit::geometry::angles::theta_of;
-use goniofit::gonio::parts::Detector;
+use goniofit::gonio::parts::{Axes, Detector};
 use goniofit::gonio::{Instrument, Preset};
 use goniofit::measurement::{Directions, Measurement};
 
@@ -77,6 +77,8 @@ fn a_study_s_readings_are_those_of_the_described_instrument() {
         let nominal = |i: &Instrument| Instrument {
             electrons: 0.0,
             read_noise: 0.0,
+            // Jitter is drawn at each stop, whatever the instrument's own errors.
+            axes: Axes { jitter_deg: 0.0, ..i.axes },
             detector: Detector {
                 aperture_deg: i.detector.aperture_deg,
                 distance_m: i.detector.distance_m,
