@@ -5,5 +5,7 @@
 
 mod coverage;
 mod limits;
+mod plan;
+mod planned;
 mod raw;
 mod support;

@@ -131,6 +131,14 @@ pub(super) fn of_reference(instrument: &Instrument) -> f64 {
     list.iter().map(|(u, q)| u * u + 3.0 * q * q).sum::<f64>().sqrt()
 }
 
+/// How often the axes stopped at each pair of directions.
+fn approaches(raw: &Raw) -> Vec<f64> {
+    let mut count = vec![0.0; raw.directions.len()];
+    let stops = raw.readings.chunk_by(|a, b| a.stop == b.stop);
+    stops.filter_map(|stop| stop[0].entry).for_each(|entry| count[entry as usize] += 1.0);
+    count
+}
+
 /// Adds what errors of positions do to every reading.
 pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: &Table, shared: &mut Shared<'_>) {
     let errors = errors(instrument);
@@ -144,6 +152,7 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
     let valid: Vec<usize> = (0..n).filter(is_valid).collect();
     let moved: Vec<_> =
         valid.par_iter().map(|&e| optics.moved(raw.directions.pair(e), &errors, model, width).1).collect();
+    let approaches = approaches(raw);
     for (&entry, list) in valid.iter().zip(&moved) {
         let (wi, wo) = raw.directions.pair(entry);
         let scale = 1.0 / (wo.z * optics.footprint.map_or(1.0, |f| f.share(wi, wo)));
@@ -160,7 +169,9 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
                     (scale * u - value * reference[k].0, scale * q - value * reference[k].1)
                 };
                 if *family == JITTER {
-                    shared.add_own(*family, place, shift * shift + 3.0 * bend * bend);
+                    // A mean over stops: what moves is divided by them, the mean of what bends is not.
+                    let moves = (shift * shift + 2.0 * bend * bend) / approaches[entry];
+                    shared.add_own(*family, place, moves + bend * bend);
                 } else {
                     shared.add(*family, (k, 0), place, shift);
                     shared.add_own(*family, place, 3.0 * bend * bend);
