@@ -15,6 +15,7 @@ mod json;
 mod materials;
 mod merl;
 mod outputs;
+mod plan;
 mod real_files;
 mod scenes;
 mod streams;

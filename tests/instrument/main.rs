@@ -11,6 +11,8 @@ mod coverage;
 mod experiment;
 mod flat;
 mod limits;
+mod plan;
+mod planned;
 mod presets;
 mod raw;
 mod support;

@@ -177,6 +177,14 @@ impl Effect {
     }
 }
 
+/// How often the axes stopped at each pair of directions.
+fn approaches(raw: &Raw) -> Vec<f64> {
+    let mut count = vec![0.0; raw.directions.len()];
+    let stops = raw.readings.chunk_by(|a, b| a.stop == b.stop);
+    stops.filter_map(|stop| stop[0].entry).for_each(|entry| count[entry as usize] += 1.0);
+    count
+}
+
 /// Adds what errors of positions do to every reading. `model` is what is read, about.
 pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: &Table, shared: &mut Shared<'_>) {
     let errors = errors(instrument, raw.dimension);
@@ -188,7 +196,11 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
     let reference = optics.of_reference(&errors);
     let values = |entry: usize| -> Vec<f64> { (0..width).map(|c| table.values[c * n + entry]).collect() };
     let valid: Vec<usize> = (0..n).filter(|e| values(*e).iter().any(|v| v.is_finite())).collect();
-    let of = |entry: &usize| effects(&optics, raw.directions.pair(*entry), &errors, &reference, model, &values(*entry));
+    let approaches = approaches(raw);
+    let of = |entry: &usize| {
+        let (pair, stops) = (raw.directions.pair(*entry), approaches[*entry]);
+        effects(&optics, (pair, stops), &errors, &reference, model, &values(*entry))
+    };
     let effects: Vec<Vec<Effect>> = valid.par_iter().map(of).collect();
     for (&entry, list) in valid.iter().zip(&effects) {
         for (c, effect) in list.iter().enumerate() {
@@ -199,10 +211,10 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
     }
 }
 
-/// The effects on one reading, channel by channel.
+/// The effects on one reading, the mean over `stops` at a pair of directions, channel by channel.
 fn effects(
     optics: &Optics<'_>,
-    pair: (DVec3, DVec3),
+    (pair, stops): ((DVec3, DVec3), f64),
     errors: &[Off],
     reference: &[(f64, f64)],
     model: &Truth<'_>,
@@ -214,6 +226,10 @@ fn effects(
     let at_reference = |k: usize| if errors[k].0 == JITTER { (0.0, 0.0) } else { reference[k] };
     let part = |c: usize, value: f64, k: usize| {
         let ((u, q), (of_u, of_q)) = (list[k][c], at_reference(k));
+        if errors[k].0 == JITTER {
+            // What moves is divided by the stops, and so is the scatter of what bends, but not its mean.
+            return (scale * u / stops.sqrt(), scale * q * ((2.0 / stops + 1.0) / 3.0).sqrt());
+        }
         (scale * u - value * of_u, scale * q - value * of_q)
     };
     let parts = |(c, value): (usize, &f64)| (0..errors.len()).map(|k| part(c, *value, k)).collect();
@@ -223,7 +239,8 @@ fn effects(
         let (linear, bent) = e.variances();
         bent > BENT * linear
     };
-    if effects.iter().any(is_bent) {
+    // Draws are of one stop.
+    if stops == 1.0 && effects.iter().any(is_bent) {
         let relative: Vec<f64> = (0..errors.len()).map(|k| at_reference(k).0).collect();
         let whole = spread::variances(optics, pair, errors, &relative, model, values);
         effects.iter_mut().zip(whole).filter(|(e, _)| is_bent(e)).for_each(|(e, v)| e.whole = Some(v));

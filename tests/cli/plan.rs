@@ -1,0 +1,110 @@
+//! Plans: a scan for a budget of instrument hours, and what is said where there can be none.
+
+use crate::bench::{Bench, number};
+
+const LAB: &str = "version = 1
+[instrument]
+electrons = 1e6
+[instrument.detector]
+full_well = 4e5
+exposures_s = [0.02, 0.5]
+[instrument.reference]
+reflectance = 0.985
+[instrument.axes]
+move_s = 2
+[instrument.surroundings]
+stray_per_sr = 2e-3
+shadow_deg = 3
+[instrument.protocol]
+block = 100
+repeats = 8
+";
+
+#[test]
+fn a_plan_is_a_scan_that_keeps_its_budget_and_is_measured_as_planned() {
+    let b = Bench::new();
+    b.write("lab.toml", LAB);
+    let said = b.json(&["plan", "--budget", "6min", "--instrument", "lab.toml", "--out", "scan.csv"]);
+    let plan = &said["scans"][0];
+    let hours = number(&plan["hours"]);
+    assert!(hours <= 0.1 && hours > 0.09, "{hours}");
+    assert_eq!(said["scans"].as_array().expect("a list").len(), 5, "beside four usual scans");
+    let readings = b.text("scan.csv").lines().filter(|l| !l.starts_with(['#', 't'])).count();
+    assert_eq!(number(&plan["readings"]), readings as f64);
+    // What simulate makes of it: the plan's pairs, none lost to shadow or saturation, in the plan's hours.
+    let args = ["--material", "satin", "--instrument", "lab.toml", "--scan", "list:scan.csv", "--out", "m.csv"];
+    let measured = b.json(&[&["simulate"][..], &args].concat());
+    assert_eq!(measured["entries"], said["pairs"]);
+    assert_eq!(number(&measured["valid"]), 3.0 * number(&said["pairs"]));
+    assert!((number(&measured["instrument_hours"]) - hours).abs() < 1e-9);
+    // And reduced from the raw readings, the same.
+    b.ok(&[&["simulate"][..], &args[..6], &["--raw", "raw.csv", "--out", "again.csv"]].concat());
+    b.ok(&["reduce", "raw.csv", "--out", "reduced.csv"]);
+    assert_eq!(b.text("again.csv"), b.text("reduced.csv"));
+    let fit = b.json(&["fit", "m.csv", "--use-sigma", "--out", "fit.json"]);
+    assert!(!fit.to_string().contains("undetermined\":[\""), "{fit}");
+}
+
+#[test]
+fn the_same_plan_whatever_the_threads_and_a_table_for_people() {
+    let b = Bench::new();
+    for threads in ["1", "2"] {
+        b.ok(&["plan", "--budget", "5min", "--threads", threads, "--out", &format!("{threads}.csv")]);
+    }
+    assert_eq!(b.bytes("1.csv"), b.bytes("2.csv"));
+    let text = b.ok(&["plan", "--model", "lambert+phong+phong", "--budget", "1h", "--out", "s.csv"]).text();
+    for says in ["phong[1].exponent", "hemisphere:10", "in-plane:5", "as many hours as the plan", "efficiency"] {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+    for model in ["lambert", "phong"] {
+        b.ok(&["plan", "--model", model, "--budget", "1min", "--out", "-"]);
+    }
+}
+
+/// A sharper prior asks for readings closer to the mirror direction.
+#[test]
+fn the_prior_decides_where_to_measure() {
+    let b = Bench::new();
+    let nearest = |range: &str| {
+        b.ok(&["plan", "--budget", "10min", "--prior", &format!("phong.exponent={range}"), "--out", "s.csv"]);
+        let text = b.text("s.csv");
+        let off = |line: &str| {
+            let cells: Vec<f64> = line.split(',').map(|c| c.parse().expect("a number")).collect();
+            let signed = if cells[3] == 0.0 { cells[2] } else { -cells[2] };
+            (signed - cells[0]).abs()
+        };
+        let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
+        rows.map(off).filter(|a| *a > 0.01).fold(f64::INFINITY, f64::min)
+    };
+    let (blunt, sharp) = (nearest("10..20"), nearest("5000..10000"));
+    assert!(sharp < 0.3 * blunt, "{sharp}° {blunt}°");
+}
+
+#[test]
+fn what_can_t_be_planned_is_said() {
+    let b = Bench::new();
+    b.write("lab.toml", LAB);
+    b.write("dark.toml", "version = 1\n[instrument]\nelectrons = 0\n");
+    for (args, says) in [
+        (&["--budget", "0"][..], "2h"),
+        (&["--budget", "soon"], "2h or 30min"),
+        (&["--budget", "20s", "--instrument", "lab.toml"], "the least that is needed"),
+        (&["--budget", "2s"], "takes 3"),
+        (&["--budget", "9999h"], "readings"),
+        (&["--budget", "1h", "--instrument", "dark.toml"], "instrument.electrons"),
+        (&["--budget", "1h", "--prior", "phong[1].exponent=1..2"], "phong[1].exponent"),
+        (&["--budget", "1h", "--prior", "phong.exponent=0..2"], "0 < LOW"),
+        (
+            &["--budget", "1h", "--prior", "phong.exponent=1..2", "--prior", "phong.exponent=1..3"],
+            "limit one parameter",
+        ),
+        (&["--budget", "1h", "--model", "lambert2d"], "flat world"),
+        (&["--budget", "1h", "--model", "ward"], "ward"),
+        (&["--budget", "1h", "--instrument", "none.toml"], "none.toml"),
+    ] {
+        let ran = b.run(&[&["plan"][..], args, &["--out", "s.csv"]].concat());
+        assert_eq!(ran.code, Some(2), "{args:?}: {}", ran.err);
+        assert!(ran.err.contains(says), "{args:?}: {}", ran.err);
+    }
+    assert!(!b.path("s.csv").exists());
+}
