@@ -1,0 +1,119 @@
+//! What each effect of the instrument costs: `cargo bench --bench effects` prints readings per second, ideal, with each effect alone, and with all. What
+//! `benches/zero-cost.sh` counts instructions of: `-- --once by-hand` reads f·cosθo without any pass, `ideal` an instrument without parts, `without NAME`
+//! one with every part but that of an effect, `left-out NAME` one with all parts and the effect left out by name.
+#![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use glam::DVec3;
+use goniofit::brdf::{LobeKind, Material};
+use goniofit::control::Control;
+use goniofit::gonio::{Instrument, Job, Scan};
+use goniofit::measurement::Dimension;
+use rayon::prelude::*;
+
+/// An effect, and what brings it.
+type Part = (&'static str, fn(&mut Instrument));
+
+const PARTS: [Part; 15] = [
+    ("axis zeros", |i| i.axes.zero_u_deg = 0.05),
+    ("axis jitter", |i| i.axes.jitter_deg = 0.02),
+    ("sample tilt", |i| i.sample.tilt_u_deg = 0.05),
+    ("sample height", |i| (i.sample.height_u_m, i.detector.distance_m) = (1e-4, 0.5)),
+    ("source divergence", |i| i.source.divergence_deg = 0.2),
+    ("detector aperture", |i| i.detector.aperture_deg = 1.0),
+    ("footprint", |i| (i.source.beam_diameter_m, i.sample.diameter_m) = (0.01, 0.02)),
+    ("shadow", |i| i.surroundings.shadow_deg = 3.0),
+    ("stray light", |i| i.surroundings.stray_per_sr = 2e-3),
+    ("source drift", |i| i.source.drift_per_sqrt_hour = 5e-3),
+    ("dark current", |i| i.detector.dark_per_s = 200.0),
+    ("saturation", |i| i.detector.full_well = 1e9),
+    ("nonlinearity", |i| (i.detector.full_well, i.detector.nonlinearity_u) = (1e9, 0.003)),
+    ("read noise", |i| i.read_noise = 8.0),
+    ("quantisation", |i| (i.detector.full_well, i.detector.bits) = (1e9, 24)),
+];
+
+/// Counts electrons, so that every part can be added; its shot noise is left out by name.
+fn bare() -> Instrument {
+    Instrument { electrons: 1e6, read_noise: 0.0, ..Instrument::default() }
+}
+
+fn with(parts: impl Iterator<Item = &'static Part>) -> Instrument {
+    let mut instrument = bare();
+    parts.for_each(|(_, add)| add(&mut instrument));
+    instrument
+}
+
+fn material() -> Material {
+    let lobes = vec![(LobeKind::Lambert, vec![0.2], vec![]), (LobeKind::Phong, vec![0.1], vec![60.0])];
+    Material::new(vec!["y".into()], lobes)
+}
+
+/// Readings made, and the seconds that they took.
+fn read(instrument: &Instrument, left_out: &[&str]) -> (usize, f64) {
+    let of = material();
+    let truth = |wi, wo, out: &mut [f64]| {
+        of.write_value(wi, wo, out);
+        true
+    };
+    let (directions, weights) = Scan::Hemisphere { step_deg: 5.0 }.directions().expect("small");
+    let (truth, channels, dimension) = (&truth, &of.channels[..], Dimension::Space);
+    let (directions, weights, seed, accuracy) = (&directions, &weights, 1, 1e-6);
+    let job = Job { truth, channels, instrument, dimension, directions, weights, seed, accuracy, left_out };
+    let clock = Instant::now();
+    let raw = black_box(job.run(Control::silent()));
+    (raw.readings.len(), clock.elapsed().as_secs_f64())
+}
+
+/// The ideal reading, written out: what a program without any effect does.
+fn by_hand() -> f64 {
+    let of = material();
+    let (directions, _) = Scan::Hemisphere { step_deg: 5.0 }.directions().expect("small");
+    let above: Vec<(DVec3, DVec3)> =
+        (0..directions.len()).map(|i| directions.pair(i)).filter(|(wi, wo)| wi.z > 0.0 && wo.z > 0.0).collect();
+    let blocks: Vec<Vec<f64>> = above
+        .par_chunks(goniofit::numeric::sum::BLOCK)
+        .map(|block| {
+            let mut f = [0.0];
+            let one = |(wi, wo): &(DVec3, DVec3)| {
+                of.write_value(*wi, *wo, &mut f);
+                1e6 * wo.z * f[0]
+            };
+            block.iter().map(one).collect()
+        })
+        .collect();
+    black_box(blocks).iter().flatten().sum()
+}
+
+fn once(args: &[String]) {
+    let named = || PARTS.iter().find(|(name, _)| Some(*name) == args.get(1).map(String::as_str)).expect("an effect").0;
+    match args.first().map(String::as_str) {
+        Some("by-hand") => println!("{}", by_hand()),
+        Some("ideal") => println!("{:?}", read(&bare(), &["shot noise"]).0),
+        Some("without") => {
+            let name = named();
+            println!("{:?}", read(&with(PARTS.iter().filter(|p| p.0 != name)), &["shot noise"]).0);
+        }
+        Some("left-out") => println!("{:?}", read(&with(PARTS.iter()), &["shot noise", named()]).0),
+        other => panic!("expected by-hand, ideal, without NAME or left-out NAME, found {other:?}"),
+    }
+}
+
+fn row(name: &str, instrument: &Instrument, left_out: &[&str]) {
+    let rate = |(count, seconds): (usize, f64)| count as f64 / seconds;
+    let best = (0..5).map(|_| rate(read(instrument, left_out))).fold(0.0, f64::max);
+    println!("| {name} | {best:.2e} |");
+}
+
+fn main() {
+    let args: Vec<String> = std::env::args().collect();
+    if let Some(at) = args.iter().position(|a| a == "--once") {
+        return once(&args[at + 1..]);
+    }
+    println!("| effects | readings a second, {} threads |\n|---|---|", rayon::current_num_threads());
+    row("none", &bare(), &["shot noise"]);
+    row("shot noise", &bare(), &[]);
+    PARTS.iter().for_each(|part| row(part.0, &with(std::iter::once(part)), &["shot noise"]));
+    row("all", &with(PARTS.iter()), &[]);
+}
