@@ -56,7 +56,7 @@ fn scan(n: f64, aperture_deg: f64) -> (Directions, Weights) {
             push(frame.to_world(glam::DVec3::new(0.0, s, c)));
         }
         (-7..=7).for_each(|k| {
-            push(direction(10f64.to_radians() * f64::from(k).abs(), if k < 0 { 0.0 } else { std::f64::consts::PI }))
+            push(direction(10f64.to_radians() * f64::from(k).abs(), if k < 0 { 0.0 } else { std::f64::consts::PI }));
         });
     }
     (Directions::List { wi, wo }, Weights::Uniform)
