@@ -56,7 +56,9 @@ fn table(plan: &Plan, found: &Contributions) -> String {
     }
     text.push_str("\n\noff:");
     for effect in off {
-        let _ = write!(text, "\n{:18} {}", effect.effect, effect.why);
+        let indent = format!("\n{:19}", "");
+        let why = wrapped(&effect.why, WIDTH - 19).join(&indent);
+        let _ = write!(text, "\n{:18} {why}", effect.effect);
     }
     text
 }

@@ -54,14 +54,14 @@ fn every_effect_is_listed_with_its_reason_and_what_it_changes() {
     }
     assert!(effect(&said, "detector aperture")["why"].as_str().expect("text").contains("aperture_deg = 1°"));
     let largest = |name: &str| number(&effect(&said, name)["reading"]["largest"]);
-    // What saturates is cut by more than its half: the longer exposure takes 25 times the shorter's electrons.
-    assert!(largest("saturation") > 0.0 && largest("shadow") == 1.0);
+    // The well is deeper than any reading; in the shadow only dark and stray light are left.
+    assert!(largest("saturation") == 0.0 && largest("shadow") > 0.9);
     // A tilt of 10⁻⁷ degrees moves readings of this material by some 10⁻⁸.
     assert!((1e-12..1e-6).contains(&largest("sample tilt")), "{}", largest("sample tilt"));
-    // The reduction subtracts the dark and the stray light, and divides by the share of the beam.
+    // The reduction subtracts the dark and the stray light, and divides by the share of the beam; only the detector bends a little otherwise.
     for name in ["dark current", "stray light", "footprint"] {
         let reduced = number(&effect(&said, name)["reduced"]["largest"]);
-        assert!(largest(name) > 1e-4 && reduced < 1e-9, "{name}: {} {reduced}", largest(name));
+        assert!(largest(name) > 0.1 && reduced < 1e-3 * largest(name), "{name}: {} {reduced}", largest(name));
     }
     assert!(number(&effect(&said, "detector aperture")["reduced"]["largest"]) > 1e-5);
     assert!(number(&effect(&said, "shadow")["masked"]) > 0.0);
@@ -104,11 +104,12 @@ fn what_a_tolerance_leaves_out_is_named_and_below_it_nothing_changes() {
     let said = b.json(&["simulate", "lab.toml", "--auto", "1e-5", "--out", "few.csv"]);
     let left: Vec<&str> =
         said["left_out"].as_array().expect("a list").iter().filter_map(|e| e["effect"].as_str()).collect();
-    assert_eq!(left, ["sample tilt"]);
+    assert_eq!(left, ["saturation", "sample tilt"]);
     let off = said["effects"].as_array().expect("a list").iter().find(|e| e["name"] == "sample tilt").expect("it");
     assert!(off["on"] == false && off["why"].as_str().expect("text").contains("at most"), "{off}");
     let none = b.json(&["simulate", "lab.toml", "--auto", "1e-12", "--out", "same.csv"]);
-    assert_eq!(none["left_out"].as_array().map(Vec::len), Some(0));
+    // A well that nothing fills changes no bit.
+    assert_eq!(none["left_out"].as_array().map(Vec::len), Some(1));
     assert_eq!(b.bytes("same.csv"), b.bytes("all.csv"));
 }
 

@@ -90,5 +90,5 @@ fn what_is_spared_changes_less_than_the_tolerance() {
     }
     // The shot noise of the darkest reading is never below 10⁻⁸; at the largest tolerance most effects go.
     assert!(counts[0] == 0 && counts[7] >= 8, "{counts:?}");
-    assert!(counts.chunks(8).all(|c| c.is_sorted()), "{counts:?}");
+    assert!(counts.chunks(8).all(<[usize]>::is_sorted), "{counts:?}");
 }
