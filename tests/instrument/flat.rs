@@ -70,7 +70,7 @@ fn readings_hold_the_truth_and_come_back_from_their_file() {
     assert!(text.contains("# dimension: 2\n") && !text.contains("phi"), "{}", &text[..400]);
     let (back, _) = Raw::from_csv(std::path::Path::new("r.csv"), &text).expect("reads back");
     assert_eq!((back.dimension, &back.signal), (Dimension::Flat, &raw.signal));
-    let (mut held, mut all) = (0, 0);
+    let (mut held, mut all) = (0u32, 0u32);
     for seed in 0..100 {
         let m = reduced(&read(&truth, &instrument, &scan, seed), &instrument, &truth).measurement;
         for i in 0..m.len() {
@@ -79,11 +79,11 @@ fn readings_hold_the_truth_and_come_back_from_their_file() {
             let own = m.sigma.as_ref().expect("noise")[i];
             let variance = own * own + m.common.iter().map(|k| k[i] * k[i]).sum::<f64>();
             all += 1;
-            held += usize::from((value - truth.value(wi, wo)[0]).abs() <= 1.96 * variance.sqrt());
+            held += u32::from((value - truth.value(wi, wo)[0]).abs() <= 1.96 * variance.sqrt());
         }
     }
     // Errors that an instrument keeps make its readings hold or miss together: the share scatters as over 100 draws, 2.2 %, at most.
-    let share = held as f64 / all as f64;
+    let share = f64::from(held) / f64::from(all);
     println!("{share}");
     assert!((share - 0.95).abs() < 0.05, "{share}");
     let wrong = Raw::from_csv(std::path::Path::new("r.csv"), &text.replace("# dimension: 2", "# dimension: 4"));
