@@ -37,12 +37,13 @@ pub struct Plan {
     pub gap: f64,
     /// Draws of the prior at which no scan tells the parameters; the plan does without them.
     pub undetermined: usize,
-    /// Draws of the prior.
+    /// Points of the prior that it is made for: draws and corners.
     pub draws: usize,
 }
 
-/// Largest share of the budget that moves to a first stop at every pair may take.
+/// Largest shares of the budget that a first stop at every pair may take: its move, and all of it.
 const MOVES: f64 = 0.2;
+const FIRST: f64 = 0.5;
 /// Most distinct pairs, and the share of the largest weight that each must have.
 const MOST_PAIRS: usize = 60;
 const LEAST_SHARE: f64 = 0.01;
@@ -57,7 +58,7 @@ pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
         return Err(Wrong::Noiseless);
     }
     let pairs = candidates::pairs(prior.sharpest(), instrument);
-    let draws = prior.draws();
+    let draws = prior.planned_for();
     let (stops, mut table) = tell(prior, instrument, &pairs, &draws);
     let open = || Wrong::Undetermined(prior.model().clone());
     let undetermined = table.drop_undetermined();
@@ -98,9 +99,11 @@ fn place((wi, wo): Pair) -> [f64; 3] {
 
 /// How many pairs the budget lets the axes stop at.
 fn affordable(wish: &Wish<'_>) -> usize {
+    let time = (wish.budget_s - 2.0 * visit_s(wish.instrument)).max(0.0);
     let move_s = wish.instrument.axes.move_s;
-    let for_moves = MOVES * (wish.budget_s - 2.0 * visit_s(wish.instrument));
-    let most = if move_s > 0.0 { (for_moves / move_s).max(0.0) as usize } else { MOST_PAIRS };
+    let stop_s = move_s + dwell_s(wish.instrument);
+    // A move of 0 s leaves infinitely many, which the clamp ends.
+    let most = (MOVES * time / move_s).min(FIRST * time / stop_s) as usize;
     most.clamp(wish.prior.ranges().len(), MOST_PAIRS)
 }
 

@@ -59,7 +59,7 @@ pub enum Wrong {
     Undetermined(ModelSpec),
     /// Not even one reading a parameter.
     #[error(
-        "budget: the least that is needed, {pairs} pairs of directions read once, takes {least_s:.4} s of the instrument, found {found_s} s"
+        "budget: the least that is needed, {pairs} pairs of directions read once, takes {least_s} s of the instrument, found {found_s} s"
     )]
     Budget {
         /// Pairs that are needed.
@@ -181,6 +181,18 @@ impl Prior {
             self.ranges.iter().zip(&PRIMES).map(of).collect()
         };
         (1..=DRAWS).map(at).collect()
+    }
+
+    /// What a plan is made for: the draws, and the corners of the ranges, so that no truth among them is left open. Corners of more than five
+    /// parameters are too many.
+    pub(super) fn planned_for(&self) -> Vec<Vec<f64>> {
+        let p = self.ranges.len();
+        let corner = |bits: u32| {
+            let of = |(k, range): (usize, &Range)| if bits >> k & 1 == 0 { range.low } else { range.high };
+            self.ranges.iter().enumerate().map(of).collect()
+        };
+        let corners = if p <= 5 { 1 << p } else { 0 };
+        self.draws().into_iter().chain((0..corners).map(corner)).collect()
     }
 }
 

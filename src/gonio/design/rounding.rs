@@ -26,6 +26,8 @@ const MOST_ROWS: f64 = 1e6;
 pub(super) fn rows(shares: &[Share], instrument: &Instrument, budget_s: f64) -> Result<Vec<u32>, Wrong> {
     let least_s = seconds(instrument, &in_order(shares, 0.0));
     if least_s > budget_s {
+        // Up to the next ms, so that the time that is asked for is enough.
+        let least_s = (1e3 * least_s).ceil() / 1e3;
         return Err(Wrong::Budget { pairs: shares.len(), least_s, found_s: budget_s });
     }
     let cheapest = shares.iter().map(|s| s.row_s).fold(f64::INFINITY, f64::min);
