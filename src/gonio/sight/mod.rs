@@ -114,7 +114,9 @@ const PIECE: f64 = 0.7;
 fn ends(n: f64, large: f64, small: f64) -> Vec<f64> {
     let reach = 2.0 * (0.5 * -(NOTHING / n).exp_m1()).sqrt().asin();
     let (first, last) = ((large - small - reach).max(0.0), large + small + reach);
-    let count = ((last - first) * n.sqrt() / PIECE).ceil().max(8.0);
+    // What a second cone has averaged is as smooth as its rule.
+    let sharpness = n.sqrt().min(SHARPEST / small);
+    let count = ((last - first) * sharpness / PIECE).ceil().max(8.0);
     let mut ends: Vec<f64> = (0..=count as usize).map(|k| first + (last - first) * k as f64 / count).collect();
     if first > 0.0 {
         ends.insert(0, 0.0);
