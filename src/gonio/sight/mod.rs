@@ -1,6 +1,6 @@
 //! Lobes as an instrument sees them: averaged over the cones of its source and its aperture.
 //!
-//! A reduced reading is ⟨f cosθo⟩/⟨cosθo⟩, means over both cones ([`super::effects`]); ⟨cosθo⟩ = cosθo (1 + cos a)/2 for an aperture of half
+//! A reduced reading is ⟨f cosθo⟩/⟨cosθo⟩, means over both cones; ⟨cosθo⟩ = cosθo (1 + cos a)/2 for an aperture of half
 //! angle a, and a Lambert lobe is read as it is. Of a Phong lobe that depends on two numbers besides the
 //! exponent: the angle α between the mirror direction r and wo, and q = cosθi/cosθo. For the mean of cosⁿ∠(r′, w′) w′ over r′ about r and w′
 //! about wo lies in the plane of both, U(α) wo + W(α) r, and its z component over cosθo is U + q W. U and W with their derivatives by n are
