@@ -82,7 +82,8 @@ fn the_budget_of_a_commercial_instrument_is_what_monte_carlo_finds() {
     check("commercial");
 }
 
-/// A reading's noise and the noise of visits together: nothing but noise is drawn.
+/// A reading's noise and the noise of visits together: nothing but noise is drawn. The classroom's converter has steps wider than its noise, whose rounding
+/// is an error that drawing noise anew does not show: there the budget must say more, step²/12 of a reading at most.
 #[test]
 fn noise_is_what_monte_carlo_finds() {
     for name in ["standards-lab", "commercial", "classroom"] {
@@ -102,6 +103,7 @@ fn noise_is_what_monte_carlo_finds() {
         }
         let ratio = (says / is).sqrt();
         println!("{name}, noise: budget over Monte Carlo {ratio:.3}");
-        assert!((ratio - 1.0).abs() < 0.1, "{name}: {ratio}");
+        let most = if name == "classroom" { 1.3 } else { 1.1 };
+        assert!((0.9..most).contains(&ratio), "{name}: {ratio}");
     }
 }
