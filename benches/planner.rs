@@ -1,14 +1,18 @@
 //! What a planned scan is worth: truths off the prior's middle, simulated, reduced and fitted, by a plan of a third of the hours beside uniform grids.
 //! `cargo bench --bench planner` prints a Markdown table; `-- --quick` does a fifth of the truths.
-#![allow(clippy::expect_used)] // a bench may fail loudly
+#![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
 
-use goniofit::gonio::parts::{Axes, Detector, Protocol, Reference, Source, Surroundings};
+use goniofit::gonio::parts::Axes;
 use goniofit::gonio::{Instrument, Scan};
 
 #[path = "../tests/instrument/planned.rs"]
 mod planned;
+#[allow(dead_code)] // the tests use more of it
+#[path = "../tests/instrument/support.rs"]
+mod support;
 
 use planned::{hours_of, planned as plan_for, rms, scan_of};
+use support::lab;
 
 const TRUTHS: u64 = 400;
 
@@ -49,25 +53,7 @@ fn moving() -> Instrument {
     Instrument { axes: Axes { move_s: 5.0, ..Axes::default() }, ..Instrument::default() }
 }
 
-/// Every part, as the laboratory of the tests has it.
+/// Every part, as the laboratory of the tests has it, and axes that stop a little off.
 fn full() -> Instrument {
-    Instrument {
-        electrons: 1e6,
-        read_noise: 8.0,
-        source: Source { drift_per_sqrt_hour: 0.01, ..Source::default() },
-        detector: Detector {
-            dark_per_s: 200.0,
-            dark_drift_per_sqrt_hour: 30.0,
-            full_well: 4e5,
-            bits: 16,
-            nonlinearity_u: 0.004,
-            exposures_s: vec![0.02, 0.5],
-            ..Detector::default()
-        },
-        reference: Reference { reflectance: 0.985, reflectance_u: 0.003, ..Reference::default() },
-        axes: Axes { move_s: 2.0, jitter_deg: 0.02, ..Axes::default() },
-        surroundings: Surroundings { stray_per_sr: 2e-3, shadow_deg: 3.0 },
-        protocol: Protocol { block: 60, repeats: 8 },
-        ..Instrument::default()
-    }
+    Instrument { axes: Axes { jitter_deg: 0.02, ..lab().axes }, ..lab() }
 }

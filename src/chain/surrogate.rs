@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::brdf::{LobeKind, LobeTerm, Material, Sight};
+use crate::brdf::{LobeKind, LobeTerm, Material};
 use crate::fit::{FitOptions, fit};
 use crate::gonio::Instrument;
 use crate::gonio::sight::Cones;
@@ -38,30 +38,16 @@ impl Surrogate {
 
     /// Writes what is read at (wi, wo), all channels, 1/sr.
     pub fn write_value(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) {
-        let Some((cones, place)) = self.cones.as_ref().and_then(|cones| Some((cones, cones.place(wi, wo)?))) else {
-            return self.material.write_value(wi, wo, out);
-        };
-        out.fill(0.0);
-        for term in &self.material.lobes {
-            for (c, out) in out.iter_mut().enumerate() {
-                *out += term.weight[c] * seen(cones, term, c, place);
-            }
+        match &self.cones {
+            Some(cones) => cones.write_value(&self.material, wi, wo, out),
+            None => self.material.write_value(wi, wo, out),
         }
     }
 }
 
-/// A lobe of weight 1 through the cones.
-fn seen(cones: &Cones, term: &LobeTerm, channel: usize, place: [f64; 2]) -> f64 {
-    let Some(shape) = term.shape_of(channel) else { return 0.0 };
-    let (mut value, mut slopes) = ([0.0], vec![vec![0.0]; shape.len()]);
-    cones.fill(term.kind, &shape, &[place], &mut value, &mut slopes);
-    value[0]
-}
-
 /// Whether the cones change a lobe whose peak stands out of the diffuse part. Of a lobe of exponent n a disc of half angle a takes n a²/4 of the peak.
 fn is_smeared(material: &Material, instrument: &Instrument) -> bool {
-    let half = |full_deg: f64| 0.5 * full_deg.to_radians();
-    let spread = half(instrument.source.divergence_deg).powi(2) + half(instrument.detector.aperture_deg).powi(2);
+    let spread = instrument.source.half_angle().powi(2) + instrument.detector.half_angle().powi(2);
     let diffuse = |c: usize| {
         let of = material.lobes.iter().filter(|l| l.kind == LobeKind::Lambert);
         of.map(|l| l.weight[c] / std::f64::consts::PI).sum::<f64>()

@@ -151,6 +151,12 @@ fn check(part: &str, numbers: &[(&str, f64, f64)]) -> Option<String> {
 }
 
 impl Source {
+    /// Half angle of the cone in which light reaches a point of the sample, rad.
+    #[must_use]
+    pub fn half_angle(&self) -> f64 {
+        0.5 * self.divergence_deg.to_radians()
+    }
+
     /// What is wrong with the numbers, if anything.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
@@ -180,6 +186,12 @@ impl Holder {
 }
 
 impl Detector {
+    /// Half angle of the cone that the aperture takes in, rad.
+    #[must_use]
+    pub fn half_angle(&self) -> f64 {
+        0.5 * self.aperture_deg.to_radians()
+    }
+
     /// What is wrong with the numbers, if anything.
     #[must_use]
     pub fn fault(&self) -> Option<String> {

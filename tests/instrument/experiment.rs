@@ -39,17 +39,12 @@ struct Seen {
 
 impl Seen {
     fn value(&self, wi: DVec3, wo: DVec3) -> f64 {
-        let Some((cones, place)) = self.cones.as_ref().and_then(|c| c.place(wi, wo).map(|place| (c, place))) else {
-            return self.material.value(wi, wo)[0];
-        };
-        let of = |lobe: &goniofit::brdf::LobeTerm| {
-            let (mut value, mut slope) = ([0.0], [vec![0.0]]);
-            let shape = lobe.shape_of(0).unwrap_or_default();
-            let slopes = if shape.is_empty() { &mut slope[..0] } else { &mut slope[..] };
-            cones.fill(lobe.kind, &shape, &[place], &mut value, slopes);
-            lobe.weight[0] * value[0]
-        };
-        self.material.lobes.iter().map(of).sum()
+        let mut value = [0.0];
+        match &self.cones {
+            Some(cones) => cones.write_value(&self.material, wi, wo, &mut value),
+            None => self.material.write_value(wi, wo, &mut value),
+        }
+        value[0]
     }
 }
 
@@ -84,13 +79,7 @@ impl Experiment {
     /// What each reading stands for.
     pub fn expected(&self, i: usize) -> f64 {
         let (wi, wo) = self.directions.pair(i);
-        self.seen.value(wi, wo) * self.mean_cos()
-    }
-
-    /// What an aperture takes from a diffuse standard: the bare instrument's reading of it lacks the factor that the described one's reduction
-    /// puts in again.
-    pub fn mean_cos(&self) -> f64 {
-        (0.25 * self.described.detector.aperture_deg).to_radians().cos().powi(2)
+        self.seen.value(wi, wo)
     }
 
     /// Raw readings of the instrument of this seed.

@@ -2,7 +2,7 @@
 
 use crate::support::*;
 use goniofit::brdf::{LobeKind, Material};
-use goniofit::gonio::parts::{Detector, Holder, Reference, Source, Surroundings};
+use goniofit::gonio::parts::Detector;
 use goniofit::gonio::{Instrument, Raw, Scan};
 use goniofit::measurement::{Dimension, Directions, Weights};
 
@@ -19,14 +19,7 @@ fn scan() -> (Directions, Weights) {
 #[test]
 fn a_nominal_instrument_s_readings_reduce_to_the_truth() {
     let (truth, scan) = (flat_material(0.3, 0.2, 15.0), scan());
-    let instrument = Instrument {
-        source: Source { beam_diameter_m: 0.02, ..Source::default() },
-        sample: Holder { diameter_m: 0.03, ..Holder::default() },
-        detector: Detector { field_diameter_m: 0.025, exposures_s: vec![0.1, 1.0], ..Detector::default() },
-        reference: Reference { reflectance: 0.98, shape: 0.2, ..Reference::default() },
-        surroundings: Surroundings { stray_per_sr: 0.01, shadow_deg: 4.0 },
-        ..Instrument::noiseless()
-    };
+    let instrument = faultless();
     let m = reduced(&read_nominal(&truth, &instrument, &scan), &instrument, &truth).measurement;
     assert_eq!(m.dimension, Dimension::Flat);
     let mut valid = 0;

@@ -3,7 +3,7 @@
 use crate::support::*;
 use goniofit::brdf::Material;
 use goniofit::control::Control;
-use goniofit::gonio::parts::{Axes, Detector, Holder, Reference, Source, Surroundings};
+use goniofit::gonio::parts::{Axes, Detector, Holder, Source, Surroundings};
 use goniofit::gonio::{Actual, Instrument, Kind, Reading};
 use goniofit::measurement::{Directions, Weights};
 
@@ -276,14 +276,7 @@ fn an_effect_that_is_off_changes_no_bit() {
 #[test]
 fn a_nominal_instrument_s_readings_reduce_to_the_truth() {
     let (material, scan) = (material(0.2, 0.1, 20.0), in_plane(10.0));
-    let instrument = Instrument {
-        source: Source { beam_diameter_m: 0.02, ..Source::default() },
-        sample: Holder { diameter_m: 0.03, ..Holder::default() },
-        detector: Detector { field_diameter_m: 0.025, exposures_s: vec![0.1, 1.0], ..Detector::default() },
-        reference: Reference { reflectance: 0.98, shape: 0.2, ..Reference::default() },
-        surroundings: Surroundings { stray_per_sr: 0.01, shadow_deg: 4.0 },
-        ..ideal()
-    };
+    let instrument = faultless();
     let raw = read_nominal(&material, &instrument, &scan);
     let m = reduced(&raw, &instrument, &material).measurement;
     let mut shadowed = 0;

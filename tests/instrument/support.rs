@@ -17,6 +17,18 @@ pub fn in_plane(step_deg: f64) -> (Directions, Weights) {
     Scan::InPlane { step_deg }.directions().expect("small")
 }
 
+/// Parts whose effects a reduction undoes: a small sample and field, a standard that is no Lambertian, brackets, stray light; no noise.
+pub fn faultless() -> Instrument {
+    Instrument {
+        source: Source { beam_diameter_m: 0.02, ..Source::default() },
+        sample: Holder { diameter_m: 0.03, ..Holder::default() },
+        detector: Detector { field_diameter_m: 0.025, exposures_s: vec![0.1, 1.0], ..Detector::default() },
+        reference: Reference { reflectance: 0.98, shape: 0.2, ..Reference::default() },
+        surroundings: Surroundings { stray_per_sr: 0.01, shadow_deg: 4.0 },
+        ..Instrument::noiseless()
+    }
+}
+
 /// Every part, with faults of a usual size; no errors of positions.
 pub fn lab() -> Instrument {
     Instrument {

@@ -16,10 +16,10 @@ use crate::measurement::Dimension;
 
 /// The pass that turns directions into electrons a second: f·cosθo where source and aperture are points, else its mean.
 pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + 'a> {
-    let half = |deg: f64, name: &str| if left_out.contains(&name) { 0.0 } else { 0.5 * deg.to_radians() };
+    let unless_out = |half_angle: f64, name: &str| if left_out.contains(&name) { 0.0 } else { half_angle };
     let instrument = maker.instrument;
-    let source = half(instrument.source.divergence_deg, super::divergence::EFFECT.name);
-    let detector = half(instrument.detector.aperture_deg, super::aperture::EFFECT.name);
+    let source = unless_out(instrument.source.half_angle(), super::divergence::EFFECT.name);
+    let detector = unless_out(instrument.detector.half_angle(), super::aperture::EFFECT.name);
     let light = Light {
         gain: instrument.gain(),
         truth: maker.truth,

@@ -110,7 +110,7 @@ impl Scale {
 
 /// The mean of cosθo over the aperture, over its value in the middle.
 fn mean_cos(instrument: &Instrument, dimension: Dimension) -> f64 {
-    let half = 0.5 * instrument.detector.aperture_deg.to_radians();
+    let half = instrument.detector.half_angle();
     match dimension {
         Dimension::Space => (0.5 * half).cos().powi(2),
         Dimension::Flat if half == 0.0 => 1.0,

@@ -20,7 +20,7 @@ use glam::DVec3;
 use self::disc::{Disc, Jet, split};
 use self::table::Table;
 use super::instrument::Instrument;
-use crate::brdf::{LobeKind, Sight};
+use crate::brdf::{LobeKind, Material, Sight};
 use crate::geometry::angles::{angle_between, theta_of};
 use crate::geometry::mirror;
 
@@ -44,10 +44,24 @@ impl Cones {
     /// Those of an instrument; `None` where both are points, so that lobes are seen as they are.
     #[must_use]
     pub fn of(instrument: &Instrument) -> Option<Self> {
-        let disc = |full_deg: f64| Disc { half: 0.5 * full_deg.to_radians() };
-        let (source, detector) = (disc(instrument.source.divergence_deg), disc(instrument.detector.aperture_deg));
+        let source = Disc { half: instrument.source.half_angle() };
+        let detector = Disc { half: instrument.detector.half_angle() };
         let any = source.half > 0.0 || detector.half > 0.0;
         any.then(|| Self { source, detector, tables: Mutex::default() })
+    }
+
+    /// Writes what is read of a material at (wi, wo), all channels, 1/sr; its own value where a cone reaches below the horizon.
+    pub fn write_value(&self, material: &Material, wi: DVec3, wo: DVec3, out: &mut [f64]) {
+        let Some(place) = self.place(wi, wo) else { return material.write_value(wi, wo, out) };
+        out.fill(0.0);
+        for term in &material.lobes {
+            for (c, out) in out.iter_mut().enumerate() {
+                let Some(shape) = term.shape_of(c) else { continue };
+                let (mut value, mut slopes) = ([0.0], vec![vec![0.0]; shape.len()]);
+                self.fill(term.kind, &shape, &[place], &mut value, &mut slopes);
+                *out += term.weight[c] * value[0];
+            }
+        }
     }
 
     /// The table for exponent `n`.
