@@ -1,12 +1,13 @@
 //! Functions of one angle, interpolated: pieces as wide as the lobe's own scale, a Chebyshev polynomial on each.
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 /// Nodes of a piece.
-const NODES: usize = 12;
+pub(super) const NODES: usize = 12;
 
 /// `F` functions of an angle from 0 on, 0 beyond the last piece.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Table<const F: usize> {
     /// Ends of the pieces, from 0 on, ascending.
     ends: Vec<f64>,
@@ -28,6 +29,17 @@ impl<const F: usize> Table<F> {
         Self { first, per_rad: steps as f64 / last, ends, pieces }
     }
 
+    /// The sum of these tables, which have the same ends, each times its weight.
+    pub fn sum(tables: &[Self; NODES], weights: &[f64; NODES]) -> Self {
+        let mut sum = tables[0].clone();
+        for (k, piece) in sum.pieces.iter_mut().enumerate() {
+            *piece = std::array::from_fn(|j| {
+                std::array::from_fn(|i| tables.iter().zip(weights).map(|(t, w)| w * t.pieces[k][j][i]).sum())
+            });
+        }
+        sum
+    }
+
     /// The functions at `alpha` ≥ 0.
     pub fn at(&self, alpha: f64) -> [f64; F] {
         let Some(first) = self.first.get((alpha * self.per_rad) as usize) else { return [0.0; F] };
@@ -41,14 +53,32 @@ impl<const F: usize> Table<F> {
     }
 }
 
-fn coefficients<const F: usize>(from: f64, to: f64, f: impl Fn(f64) -> [f64; F]) -> [[f64; F]; NODES] {
+/// cos(jθ) at the nodes' angles θ, and the nodes themselves at j = 1.
+static COSINES: LazyLock<[[f64; NODES]; NODES]> = LazyLock::new(|| {
     let angle = |k: usize| PI * (k as f64 + 0.5) / NODES as f64;
-    let values: [[f64; F]; NODES] = std::array::from_fn(|k| f(0.5 * (from + to) + 0.5 * (to - from) * angle(k).cos()));
+    std::array::from_fn(|j| std::array::from_fn(|k| (j as f64 * angle(k)).cos()))
+});
+
+/// Where a function is asked for to be interpolated between `from` and `to`.
+pub(super) fn nodes(from: f64, to: f64) -> [f64; NODES] {
+    COSINES[1].map(|x| 0.5 * (from + to) + 0.5 * (to - from) * x)
+}
+
+/// What each node's value counts at `at`.
+pub(super) fn weights(from: f64, to: f64, at: f64) -> [f64; NODES] {
+    let angle = ((2.0 * at - from - to) / (to - from)).clamp(-1.0, 1.0).acos();
+    let polynomials: [f64; NODES] = std::array::from_fn(|j| (j as f64 * angle).cos());
+    std::array::from_fn(|k| {
+        let terms = (1..NODES).map(|j| 2.0 * polynomials[j] * COSINES[j][k]);
+        (1.0 + terms.sum::<f64>()) / NODES as f64
+    })
+}
+
+fn coefficients<const F: usize>(from: f64, to: f64, f: impl Fn(f64) -> [f64; F]) -> [[f64; F]; NODES] {
+    let values = nodes(from, to).map(f);
     std::array::from_fn(|j| {
         let scale = if j == 0 { 1.0 } else { 2.0 } / NODES as f64;
-        std::array::from_fn(|i| {
-            scale * values.iter().enumerate().map(|(k, v)| v[i] * (j as f64 * angle(k)).cos()).sum::<f64>()
-        })
+        std::array::from_fn(|i| scale * values.iter().zip(&COSINES[j]).map(|(v, cos)| v[i] * cos).sum::<f64>())
     })
 }
 
