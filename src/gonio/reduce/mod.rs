@@ -4,7 +4,9 @@
 //! reference's, b and r interpolated between the visits before and after. Without a reference the gain is taken as stated. What is
 //! measured is f averaged over the cones of source and aperture, weighed by cosθo: ⟨f cosθo⟩/⟨cosθo⟩.
 
+mod bend;
 mod budget;
+mod effect;
 pub(super) mod positions;
 mod shared;
 mod spread;

@@ -1,10 +1,9 @@
 //! Errors of positions: what a reading changes by when axes, tilt or height are off by their uncertainties, by a model of what is read.
 //!
 //! Each error is moved by ± its σ. Half the difference is the component u, the same error in all readings (of jitter: each reading's own); the
-//! average of both less the value in the middle, q, is what the error's square does: its mean square is 3 q². Where squares matter the errors' effect
-//! is no normal distribution: there [`super::spread`] draws them all, and the variance is that of the normal distribution whose 95 % interval is as
-//! wide. What squares of kept errors do there is a component too, for it has a pattern, a lobe that is broader or narrower; elsewhere it counts as
-//! the reading's own.
+//! average of both less the value in the middle, q, is what the error's square does: its mean square is 3 q². Squares of kept errors, and products of
+//! two, have patterns that readings share, a lobe that is broader or lower: [`super::bend`]. Where they matter the errors' effect is no normal
+//! distribution: there [`super::spread`] draws them all, and the variance is that of the normal distribution whose 95 % interval is as wide.
 //!
 //! The model is what is read, the mean over source and aperture in it: a fit to readings has seen that mean already.
 
@@ -12,8 +11,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Table;
+use super::bend::pairs;
+use super::effect::{Effect, effects, place_all};
 use super::shared::{HEIGHT, JITTER, Shared, TILT, ZEROS};
-use super::spread;
 use crate::geometry::angles::turned;
 use crate::gonio::effects::footprint::Footprint;
 use crate::gonio::effects::height::seen;
@@ -23,9 +23,6 @@ use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::simulate::Truth;
 use crate::measurement::Dimension;
-
-/// Share of the variance from which on squares of errors call for draws: a normal interval then holds 94.6 % of an exponential flank.
-const BENT: f64 = 0.02;
 
 /// By how much everything is off.
 #[derive(Debug, Clone, Copy, Default)]
@@ -115,7 +112,7 @@ impl<'a> Optics<'a> {
     }
 
     /// u and q of every error: half the difference and the rest of the average, channel by channel, and the flux in the middle.
-    fn moved(
+    pub fn moved(
         &self,
         pair: (DVec3, DVec3),
         errors: &[Off],
@@ -130,6 +127,26 @@ impl<'a> Optics<'a> {
         };
         let list = errors.iter().map(of).collect();
         (middle, list)
+    }
+
+    /// What every two of these errors do together beside what each does alone (`alone` are their q), pair by pair, channel by channel.
+    pub fn products(
+        &self,
+        pair: (DVec3, DVec3),
+        errors: &[Off],
+        alone: &[Vec<f64>],
+        f: &Truth<'_>,
+        width: usize,
+    ) -> Vec<Vec<f64>> {
+        let middle = self.flux(pair, &Pose::default(), f, width);
+        let together = |(a, b): (usize, usize)| {
+            let [up, down] = [1.0, -1.0].map(|sign| {
+                let pose = |k: usize| (errors[k].1)(sign * errors[k].2);
+                self.flux(pair, &pose(a).plus(&pose(b)), f, width)
+            });
+            (0..width).map(|c| 0.5 * (up[c] + down[c]) - middle[c] - alone[a][c] - alone[b][c]).collect()
+        };
+        pairs(errors.len()).map(together).collect()
     }
 
     /// u and q of every error at the reference, relative.
@@ -153,28 +170,6 @@ pub(super) fn of_reference(instrument: &Instrument, dimension: Dimension) -> f64
         errors(instrument, dimension).into_iter().filter(|(family, _, _)| *family == JITTER).collect();
     let list = Optics::new(instrument, dimension).of_reference(&jitter);
     list.iter().map(|(u, q)| u * u + 3.0 * q * q).sum::<f64>().sqrt()
-}
-
-/// What every error does to one reading of one channel, 1/sr: u and q; and the variance of all together where squares matter.
-struct Effect {
-    parts: Vec<(f64, f64)>,
-    whole: Option<f64>,
-}
-
-impl Effect {
-    fn variances(&self) -> (f64, f64) {
-        self.parts.iter().fold((0.0, 0.0), |(linear, bent), (u, q)| (linear + u * u, bent + 3.0 * q * q))
-    }
-
-    /// Factors of all u² and all 3 q², so that they add up to the whole.
-    fn factors(&self) -> (f64, f64) {
-        let (linear, bent) = self.variances();
-        match self.whole {
-            Some(whole) if whole < linear => (whole / linear, 0.0),
-            Some(whole) if bent > 0.0 => (1.0, (whole - linear) / bent),
-            _ => (1.0, 1.0),
-        }
-    }
 }
 
 /// How often the axes stopped at each pair of directions.
@@ -202,65 +197,10 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
         effects(&optics, (pair, stops), &errors, &reference, model, &values(*entry))
     };
     let effects: Vec<Vec<Effect>> = valid.par_iter().map(of).collect();
-    for (&entry, list) in valid.iter().zip(&effects) {
-        for (c, effect) in list.iter().enumerate() {
-            if table.values[c * n + entry].is_finite() {
-                place(effect, &errors, c * n + entry, shared);
-            }
-        }
-    }
-}
-
-/// The effects on one reading, the mean over `stops` at a pair of directions, channel by channel.
-fn effects(
-    optics: &Optics<'_>,
-    (pair, stops): ((DVec3, DVec3), f64),
-    errors: &[Off],
-    reference: &[(f64, f64)],
-    model: &Truth<'_>,
-    values: &[f64],
-) -> Vec<Effect> {
-    let scale = optics.scale(pair);
-    let (_, list) = optics.moved(pair, errors, model, values.len());
-    // Where the axes stop at the reference is noise of its visit.
-    let at_reference = |k: usize| if errors[k].0 == JITTER { (0.0, 0.0) } else { reference[k] };
-    let part = |c: usize, value: f64, k: usize| {
-        let ((u, q), (of_u, of_q)) = (list[k][c], at_reference(k));
-        if errors[k].0 == JITTER {
-            // What moves is divided by the stops, and so is the scatter of what bends, but not its mean.
-            return (scale * u / stops.sqrt(), scale * q * ((2.0 / stops + 1.0) / 3.0).sqrt());
-        }
-        (scale * u - value * of_u, scale * q - value * of_q)
-    };
-    let parts = |(c, value): (usize, &f64)| (0..errors.len()).map(|k| part(c, *value, k)).collect();
-    let mut effects: Vec<Effect> =
-        values.iter().enumerate().map(|of| Effect { parts: parts(of), whole: None }).collect();
-    let is_bent = |e: &Effect| {
-        let (linear, bent) = e.variances();
-        bent > BENT * linear
-    };
-    // Draws are of one stop.
-    if stops == 1.0 && effects.iter().any(is_bent) {
-        let relative: Vec<f64> = (0..errors.len()).map(|k| at_reference(k).0).collect();
-        let whole = spread::variances(optics, pair, errors, &relative, model, values);
-        effects.iter_mut().zip(whole).filter(|(e, _)| is_bent(e)).for_each(|(e, v)| e.whole = Some(v));
-    }
-    effects
-}
-
-/// Puts an effect where it belongs: shared errors into components, the rest into the reading's own.
-fn place(effect: &Effect, errors: &[Off], place: usize, shared: &mut Shared<'_>) {
-    let (of_linear, of_bent) = effect.factors();
-    for (k, ((family, _, _), (u, q))) in errors.iter().zip(&effect.parts).enumerate() {
-        if *family == JITTER {
-            shared.add_own(*family, place, of_linear * u * u);
-        } else {
-            shared.add(*family, (k, 0), place, of_linear.sqrt() * u);
-        }
-        if *family == JITTER || effect.whole.is_none() {
-            shared.add_own(*family, place, of_bent * 3.0 * q * q);
-        } else {
-            shared.add(*family, (k, 1), place, (3.0 * of_bent).sqrt() * q);
-        }
-    }
+    let of_channels = valid
+        .iter()
+        .zip(effects)
+        .flat_map(|(entry, list)| list.into_iter().enumerate().map(move |(c, effect)| (c * n + entry, effect)));
+    let placed: Vec<(usize, Effect)> = of_channels.filter(|(place, _)| table.values[*place].is_finite()).collect();
+    place_all(&placed, &errors, shared);
 }

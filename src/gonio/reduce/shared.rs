@@ -17,7 +17,8 @@ const MODES: usize = 2;
 
 /// One component and what it belongs to.
 struct Component {
-    family: usize,
+    /// Its line of the budget; none where parts of it were attributed to several.
+    family: Option<usize>,
     /// 1 σ in every reading, channel-major.
     plane: Vec<f64>,
 }
@@ -28,14 +29,17 @@ struct Family {
     kind: Type,
     /// Variance that is not in any component, by reading; empty for none.
     own: Vec<f64>,
+    /// Its part of components and variances that belong to several, by reading; empty for none.
+    attributed: Vec<f64>,
 }
 
 /// All of them.
 pub(super) struct Shared<'a> {
     instrument: &'a Instrument,
     size: usize,
-
     families: Vec<Family>,
+    /// Variance of readings that was attributed; empty for none.
+    own: Vec<f64>,
     components: Vec<Component>,
     /// Component of (family, group of visits, channel or mode).
     places: std::collections::HashMap<(usize, usize, usize), usize>,
@@ -74,12 +78,15 @@ impl<'a> Shared<'a> {
     pub fn new(entries: usize, width: usize, visits: &Visits, instrument: &'a Instrument) -> Self {
         let size = entries * width;
         let afforded = (MOST_NUMBERS / size.max(1) / (2 * width + 2 * MODES + 1)).clamp(1, MOST_GROUPS);
-        let families = NAMES.map(|(name, kind)| Family { name, kind, own: Vec::new() }).into_iter().collect();
+        let families = NAMES
+            .map(|(name, kind)| Family { name, kind, own: Vec::new(), attributed: Vec::new() })
+            .into_iter()
+            .collect();
         Self {
             instrument,
             size,
-
             families,
+            own: Vec::new(),
             components: Vec::new(),
             places: std::collections::HashMap::new(),
             group: visits.len().div_ceil(afforded).max(1),
@@ -94,7 +101,7 @@ impl<'a> Shared<'a> {
         }
         let (size, list) = (self.size, &mut self.components);
         let component = *self.places.entry((family, part.0, part.1)).or_insert_with(|| {
-            list.push(Component { family, plane: vec![0.0; size] });
+            list.push(Component { family: Some(family), plane: vec![0.0; size] });
             list.len() - 1
         });
         self.components[component].plane[place] += u;
@@ -102,11 +109,24 @@ impl<'a> Shared<'a> {
 
     /// Adds a variance of a reading's own.
     pub fn add_own(&mut self, family: usize, place: usize, variance: f64) {
-        let own = &mut self.families[family].own;
-        if own.is_empty() {
-            own.resize(self.size, 0.0);
-        }
-        own[place] += variance;
+        add_at(&mut self.families[family].own, self.size, place, variance);
+    }
+
+    /// Adds a component of several families, whose parts are attributed: 1 σ at these readings.
+    pub fn add_plane(&mut self, of: impl Iterator<Item = (usize, f64)>) {
+        let mut plane = vec![0.0; self.size];
+        of.for_each(|(place, u)| plane[place] = u);
+        self.components.push(Component { family: None, plane });
+    }
+
+    /// Adds a variance of a reading's own that belongs to several families, whose parts are attributed.
+    pub fn add_attributed(&mut self, place: usize, variance: f64) {
+        add_at(&mut self.own, self.size, place, variance);
+    }
+
+    /// Says what a family has of such components and variances.
+    pub fn attribute(&mut self, family: usize, place: usize, variance: f64) {
+        add_at(&mut self.families[family].attributed, self.size, place, variance);
     }
 
     /// Adds an error that all readings between visits share, by group.
@@ -169,16 +189,21 @@ impl<'a> Shared<'a> {
 
     /// The variance of each reading that it shares with no other, added up into the table.
     pub fn own_into(&self, table: &mut Table) {
-        for family in self.families.iter().filter(|f| !f.own.is_empty()) {
-            table.variance.iter_mut().zip(&family.own).for_each(|(to, own)| *to += own);
+        for list in self.families.iter().map(|f| &f.own).chain([&self.own]) {
+            table.variance.iter_mut().zip(list).for_each(|(to, own)| *to += own);
         }
     }
 
     /// Where the uncertainty comes from.
     pub fn budget(&self, table: &Table) -> Budget {
-        let mut variances: Vec<Vec<f64>> =
-            self.families.iter().map(|f| if f.own.is_empty() { vec![0.0; self.size] } else { f.own.clone() }).collect();
+        let mut variances = vec![vec![0.0; self.size]; self.families.len()];
+        for (to, family) in variances.iter_mut().zip(&self.families) {
+            for list in [&family.own, &family.attributed] {
+                to.iter_mut().zip(list).for_each(|(to, variance)| *to += variance);
+            }
+        }
         for Component { family, plane } in &self.components {
+            let Some(family) = family else { continue };
             variances[*family].iter_mut().zip(plane).for_each(|(to, u)| *to += u * u);
         }
         let lines = self.families.iter().zip(variances).map(|(f, variance)| (f.name, f.kind, variance));
@@ -189,4 +214,11 @@ impl<'a> Shared<'a> {
     pub fn planes(self) -> Vec<Vec<f64>> {
         self.components.into_iter().map(|c| c.plane).collect()
     }
+}
+
+fn add_at(list: &mut Vec<f64>, size: usize, place: usize, variance: f64) {
+    if list.is_empty() {
+        list.resize(size, 0.0);
+    }
+    list[place] += variance;
 }

@@ -1,0 +1,131 @@
+//! What all errors of positions do to one reading, and where that belongs.
+
+use glam::DVec3;
+
+use super::bend::{self, Bend};
+use super::positions::{Off, Optics};
+use super::shared::{JITTER, Shared};
+use super::spread;
+use crate::gonio::simulate::Truth;
+
+/// Share of the variance from which on squares of errors call for draws: a normal interval then holds 94.6 % of an exponential flank.
+const BENT: f64 = 0.02;
+/// Share from which on they are worth knowing: a lobe's readings on both sides of its peak cancel what is in proportion.
+const CURVED: f64 = 1e-4;
+
+/// Effects on one reading of one channel, 1/sr: u and q of every error, what kept ones do in second order where it matters, and the variance of all
+/// together where the second order matters much.
+#[derive(Debug)]
+pub(super) struct Effect {
+    parts: Vec<(f64, f64)>,
+    bend: Option<Bend>,
+    whole: Option<f64>,
+}
+
+impl Effect {
+    /// Variances of first and second order.
+    fn variances(&self, kept: usize) -> (f64, f64) {
+        let linear = self.parts.iter().map(|(u, _)| u * u).sum();
+        let squares = |list: &[(f64, f64)]| list.iter().map(|(_, q)| 3.0 * q * q).sum::<f64>();
+        let bent = self.bend.as_ref().map_or_else(|| squares(&self.parts[..kept]), Bend::variance);
+        (linear, bent + squares(&self.parts[kept..]))
+    }
+
+    /// Factors of both, so that they add up to the whole.
+    fn factors(&self, kept: usize) -> (f64, f64) {
+        let (linear, bent) = self.variances(kept);
+        match self.whole {
+            Some(whole) if whole < linear => (whole / linear, 0.0),
+            Some(whole) if bent > 0.0 => (1.0, (whole - linear) / bent),
+            _ => (1.0, 1.0),
+        }
+    }
+}
+
+/// How many of the errors the instrument keeps: the first ones.
+fn kept(errors: &[Off]) -> usize {
+    errors.iter().filter(|(family, _, _)| *family != JITTER).count()
+}
+
+/// The effects on one reading, the mean over `stops` at a pair of directions, channel by channel.
+pub(super) fn effects(
+    optics: &Optics<'_>,
+    (pair, stops): ((DVec3, DVec3), f64),
+    errors: &[Off],
+    reference: &[(f64, f64)],
+    model: &Truth<'_>,
+    values: &[f64],
+) -> Vec<Effect> {
+    let scale = optics.scale(pair);
+    let (_, list) = optics.moved(pair, errors, model, values.len());
+    // Where the axes stop at the reference is noise of its visit.
+    let at_reference = |k: usize| if errors[k].0 == JITTER { (0.0, 0.0) } else { reference[k] };
+    let part = |c: usize, value: f64, k: usize| {
+        let ((u, q), (of_u, of_q)) = (list[k][c], at_reference(k));
+        if errors[k].0 == JITTER {
+            // What moves is divided by the stops, and so is the scatter of what bends, but not its mean.
+            return (scale * u / stops.sqrt(), scale * q * ((2.0 / stops + 1.0) / 3.0).sqrt());
+        }
+        (scale * u - value * of_u, scale * q - value * of_q)
+    };
+    let parts = |(c, value): (usize, &f64)| (0..errors.len()).map(|k| part(c, *value, k)).collect();
+    let mut effects: Vec<Effect> =
+        values.iter().enumerate().map(|of| Effect { parts: parts(of), bend: None, whole: None }).collect();
+    let kept = kept(errors);
+    let share = |e: &Effect| {
+        let (linear, bent) = e.variances(kept);
+        bent / (linear + bent)
+    };
+    if kept > 0 && effects.iter().any(|e| share(e) > CURVED) {
+        let alone: Vec<Vec<f64>> = list[..kept].iter().map(|of| of.iter().map(|(_, q)| *q).collect()).collect();
+        let products = optics.products(pair, &errors[..kept], &alone, model, values.len());
+        for (c, effect) in effects.iter_mut().enumerate() {
+            let squares = effect.parts[..kept].iter().map(|(_, q)| *q).collect();
+            effect.bend = Some(Bend { squares, products: products.iter().map(|of| scale * of[c]).collect() });
+        }
+    }
+    // Draws are of one stop.
+    if stops == 1.0 && effects.iter().any(|e| share(e) > BENT) {
+        let relative: Vec<f64> = (0..errors.len()).map(|k| at_reference(k).0).collect();
+        let whole = spread::variances(optics, pair, errors, &relative, model, values);
+        effects.iter_mut().zip(whole).filter(|(e, _)| share(e) > BENT).for_each(|(e, v)| e.whole = Some(v));
+    }
+    effects
+}
+
+/// Puts effects on readings of these places where they belong: what readings share into components, the rest into each one's own.
+pub(super) fn place_all(list: &[(usize, Effect)], errors: &[Off], shared: &mut Shared<'_>) {
+    let kept = kept(errors);
+    for (place, effect) in list {
+        let (of_linear, of_bent) = effect.factors(kept);
+        for (k, ((family, _, _), (u, q))) in errors.iter().zip(&effect.parts).enumerate() {
+            if k >= kept {
+                shared.add_own(*family, *place, of_linear * u * u + of_bent * 3.0 * q * q);
+                continue;
+            }
+            shared.add(*family, (k, 0), *place, of_linear.sqrt() * u);
+            match &effect.bend {
+                Some(bend) => shared.attribute(*family, *place, of_bent * bend.variance_of(k)),
+                None => shared.add_own(*family, *place, of_bent * 3.0 * q * q),
+            }
+        }
+    }
+    place_bent(list, kept, shared);
+}
+
+/// The second order of kept errors, as components.
+fn place_bent(list: &[(usize, Effect)], kept: usize, shared: &mut Shared<'_>) {
+    let bent: Vec<(usize, Bend, f64)> = list
+        .iter()
+        .filter_map(|(place, effect)| {
+            let (of_linear, of_bent) = effect.factors(kept);
+            Some((*place, effect.bend.as_ref()?.scaled(of_bent.sqrt()), of_linear * effect.variances(kept).0))
+        })
+        .collect();
+    let (planes, own) = bend::components(&bent.iter().map(|(_, b, first)| (b, *first)).collect::<Vec<_>>());
+    let places = || bent.iter().map(|(place, _, _)| *place);
+    for plane in planes {
+        shared.add_plane(places().zip(plane));
+    }
+    places().zip(own).for_each(|(place, variance)| shared.add_attributed(place, variance));
+}
