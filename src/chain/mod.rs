@@ -8,6 +8,7 @@
 mod demo;
 mod error;
 mod gallery;
+mod lean;
 mod library;
 mod measure;
 mod output;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::lean;
 use crate::brdf::{LobeKind, LobeTerm, Material};
 use crate::fit::{FitOptions, fit};
 use crate::gonio::Instrument;
@@ -12,6 +13,8 @@ use crate::measurement::{Dimension, Measurement};
 const MODEL: &str = "lambert+phong+phong";
 /// Share by which source and aperture may lower a lobe's peak before its slopes are not those of a lobe any more.
 const SMEARED: f64 = 0.05;
+/// Share of a lobe's width from which on it counts that errors of positions move it.
+const STANDS_OFF: f64 = 0.2;
 
 /// A fitted model, and the cones through which it was fitted, where they count.
 pub(super) struct Surrogate {
@@ -20,8 +23,17 @@ pub(super) struct Surrogate {
 }
 
 impl Surrogate {
-    /// Fits one to reduced readings: plainly, unless source and aperture smear a lobe that stands out. `None` where no fit has an answer.
+    /// Fits one to reduced readings, with the lean that they show where that counts. `None` where no fit has an answer.
     pub fn of(readings: &Measurement, instrument: &Instrument) -> Option<Self> {
+        let upright = Self::fitted(readings, instrument)?;
+        if readings.dimension == Dimension::Flat || !may_stand_off(&upright.material, instrument) {
+            return Some(upright);
+        }
+        Some(lean::found(readings, instrument, upright, |turned| Self::fitted(turned, instrument)))
+    }
+
+    /// A plain fit, unless source and aperture smear a lobe that stands out.
+    fn fitted(readings: &Measurement, instrument: &Instrument) -> Option<Self> {
         let options = FitOptions::new(MODEL.parse().ok()?);
         let plain = fit(readings, &options).ok()?.material;
         let cones = || Cones::of(instrument).filter(|_| readings.dimension == Dimension::Space);
@@ -45,19 +57,31 @@ impl Surrogate {
     }
 }
 
+/// Sum of the squares of both cones' half angles.
+fn spread(instrument: &Instrument) -> f64 {
+    instrument.source.half_angle().powi(2) + instrument.detector.half_angle().powi(2)
+}
+
 /// Whether the cones change a lobe whose peak stands out of the diffuse part. Of a lobe of exponent n a disc of half angle a takes n a²/4 of the peak.
 fn is_smeared(material: &Material, instrument: &Instrument) -> bool {
-    let spread = instrument.source.half_angle().powi(2) + instrument.detector.half_angle().powi(2);
+    has_lobe(material, |n| 0.25 * n * spread(instrument) > SMEARED)
+}
+
+/// Whether errors of positions move a lobe by a good part of its width as it is seen, (1/n + a²/4)^½ for half angles a.
+fn may_stand_off(material: &Material, instrument: &Instrument) -> bool {
+    let moved = 2.0 * lean::sigma(instrument);
+    has_lobe(material, |n| moved > STANDS_OFF * (n.recip() + 0.25 * spread(instrument)).sqrt())
+}
+
+/// Whether there is a lobe whose peak stands out of the diffuse part, with such an exponent.
+fn has_lobe(material: &Material, is: impl Fn(f64) -> bool) -> bool {
     let diffuse = |c: usize| {
         let of = material.lobes.iter().filter(|l| l.kind == LobeKind::Lambert);
         of.map(|l| l.weight[c] / std::f64::consts::PI).sum::<f64>()
     };
     let stands_out = |term: &LobeTerm, c: usize| {
         let exponent = term.shape_of(c).and_then(|shape| shape.first().copied());
-        exponent.is_some_and(|n| {
-            let peak = term.weight[c] * (n + 2.0) / std::f64::consts::TAU;
-            0.25 * n * spread > SMEARED && peak > diffuse(c)
-        })
+        exponent.is_some_and(|n| is(n) && term.weight[c] * (n + 2.0) / std::f64::consts::TAU > diffuse(c))
     };
     let channels = 0..material.channels.len();
     material.lobes.iter().any(|term| channels.clone().any(|c| stands_out(term, c)))

@@ -30,6 +30,7 @@ pub use afford::Affordable;
 pub use contribution::{Change, Contribution, Contributions};
 pub use cost::{hours, seconds};
 pub use effects::plan;
+pub(crate) use effects::tilt::frame as lean;
 pub use forward::{ACCURACY, Job, lit_rows};
 pub use instrument::Instrument;
 pub use presets::{PRESETS, Preset};

@@ -12,7 +12,7 @@ pub(super) const EFFECT: Entry = Entry {
 };
 
 /// Turns directions of the axes' frame into the sample's, whose normal leans by `tilt` towards +x and +y.
-pub(in crate::gonio) fn frame([x, y]: [f64; 2]) -> DQuat {
+pub(crate) fn frame([x, y]: [f64; 2]) -> DQuat {
     DQuat::from_scaled_axis(DVec3::new(y, -x, 0.0))
 }
 

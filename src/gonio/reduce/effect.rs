@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::bend::{self, Bend};
 use super::positions::{Off, Optics};
 use super::shared::{JITTER, Shared};
-use super::spread;
+use super::spread::{self, Heights};
 use crate::gonio::simulate::Truth;
 
 /// Share of the variance from which on squares of errors call for draws: a normal interval then holds 94.6 % of an exponential flank.
@@ -31,6 +31,12 @@ impl Effect {
         (linear, bent + squares(&self.parts[kept..]))
     }
 
+    /// What the second order has of both.
+    fn share(&self, kept: usize) -> f64 {
+        let (linear, bent) = self.variances(kept);
+        bent / (linear + bent)
+    }
+
     /// Factors of both, so that they add up to the whole.
     fn factors(&self, kept: usize) -> (f64, f64) {
         let (linear, bent) = self.variances(kept);
@@ -43,7 +49,7 @@ impl Effect {
 }
 
 /// How many of the errors the instrument keeps: the first ones.
-fn kept(errors: &[Off]) -> usize {
+pub(super) fn kept(errors: &[Off]) -> usize {
     errors.iter().filter(|(family, _, _)| *family != JITTER).count()
 }
 
@@ -72,11 +78,7 @@ pub(super) fn effects(
     let mut effects: Vec<Effect> =
         values.iter().enumerate().map(|of| Effect { parts: parts(of), bend: None, whole: None }).collect();
     let kept = kept(errors);
-    let share = |e: &Effect| {
-        let (linear, bent) = e.variances(kept);
-        bent / (linear + bent)
-    };
-    if kept > 0 && effects.iter().any(|e| share(e) > CURVED) {
+    if kept > 0 && effects.iter().any(|e| e.share(kept) > CURVED) {
         let alone: Vec<Vec<f64>> = list[..kept].iter().map(|of| of.iter().map(|(_, q)| *q).collect()).collect();
         let products = optics.products(pair, &errors[..kept], &alone, model, values.len());
         for (c, effect) in effects.iter_mut().enumerate() {
@@ -84,13 +86,30 @@ pub(super) fn effects(
             effect.bend = Some(Bend { squares, products: products.iter().map(|of| scale * of[c]).collect() });
         }
     }
-    // Draws are of one stop.
-    if stops == 1.0 && effects.iter().any(|e| share(e) > BENT) {
-        let relative: Vec<f64> = (0..errors.len()).map(|k| at_reference(k).0).collect();
-        let whole = spread::variances(optics, pair, errors, &relative, model, values);
-        effects.iter_mut().zip(whole).filter(|(e, _)| share(e) > BENT).for_each(|(e, v)| e.whole = Some(v));
-    }
     effects
+}
+
+/// Whether the second order of one of these matters so much that errors have to be drawn.
+pub(super) fn is_bent(effects: &[Effect], errors: &[Off]) -> bool {
+    effects.iter().any(|e| e.share(kept(errors)) > BENT)
+}
+
+/// Draws all errors of a reading where its second order calls for it.
+pub(super) fn draw(
+    effects: &mut [Effect],
+    optics: &Optics<'_>,
+    pair: (DVec3, DVec3),
+    (errors, heights): (&[Off], &Heights),
+    reference: &[(f64, f64)],
+    model: &Truth<'_>,
+    values: &[f64],
+) {
+    // Where the axes stop at the reference is noise of its visit.
+    let of_reference = |(k, of): (usize, &(f64, f64))| if errors[k].0 == JITTER { 0.0 } else { of.0 };
+    let relative: Vec<f64> = reference.iter().enumerate().map(of_reference).collect();
+    let whole = spread::variances(optics, pair, (errors, heights), &relative, model, values);
+    let bent = effects.iter_mut().zip(whole).filter(|(e, _)| e.share(kept(errors)) > BENT);
+    bent.for_each(|(e, v)| e.whole = Some(v));
 }
 
 /// Puts effects on readings of these places where they belong: what readings share into components, the rest into each one's own.

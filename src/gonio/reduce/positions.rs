@@ -12,8 +12,9 @@ use rayon::prelude::*;
 
 use super::Table;
 use super::bend::pairs;
-use super::effect::{Effect, effects, place_all};
+use super::effect::{Effect, draw, effects, is_bent, kept, place_all};
 use super::shared::{HEIGHT, JITTER, Shared, TILT, ZEROS};
+use super::spread::Heights;
 use crate::geometry::angles::turned;
 use crate::gonio::effects::footprint::Footprint;
 use crate::gonio::effects::height::seen;
@@ -196,7 +197,18 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
         let (pair, stops) = (raw.directions.pair(*entry), approaches[*entry]);
         effects(&optics, (pair, stops), &errors, &reference, model, &values(*entry))
     };
-    let effects: Vec<Vec<Effect>> = valid.par_iter().map(of).collect();
+    let mut effects: Vec<Vec<Effect>> = valid.par_iter().map(of).collect();
+    // Draws are of one stop.
+    let bent = |(entry, list): (usize, &Vec<Effect>)| approaches[entry] == 1.0 && is_bent(list, &errors);
+    if valid.iter().copied().zip(&effects).any(bent) {
+        let pairs: Vec<(DVec3, DVec3)> = valid.iter().map(|e| raw.directions.pair(*e)).collect();
+        let heights = Heights::new(&optics, &pairs, &errors[..kept(&errors)], model, width);
+        let listed = valid.par_iter().zip(&mut effects).filter(|(entry, list)| bent((**entry, list)));
+        listed.for_each(|(entry, list)| {
+            let pair = raw.directions.pair(*entry);
+            draw(list, &optics, pair, (&errors, &heights), &reference, model, &values(*entry));
+        });
+    }
     let of_channels = valid
         .iter()
         .zip(effects)

@@ -1,0 +1,112 @@
+//! Where a sharp lobe stands: the lean of the sample that readings show.
+//!
+//! Axes' zeros and the sample's tilt move a lobe's peak. A model whose lobe must stand at the mirror direction then fits a lobe that is broader and
+//! lower than what is there, and too little would be made of what positions can do. So the lean is fitted too, against what the instrument says of it.
+
+use glam::{DQuat, DVec3};
+use nalgebra::{Matrix2, Vector2};
+
+use super::surrogate::Surrogate;
+use crate::gonio::{Instrument, lean};
+use crate::measurement::{Directions, Measurement, Weights};
+
+/// Fits of lean and material, one after the other.
+const ROUNDS: usize = 5;
+/// Steps of a difference quotient, and most of a step, in σ of the lean.
+const STEP: f64 = 0.1;
+const MOST: f64 = 1.5;
+
+/// 1 σ of the lean that the readings of this instrument may have, rad: half of what zeros and tilt move a peak by.
+pub(super) fn sigma(instrument: &Instrument) -> f64 {
+    let (zero, tilt) = (instrument.axes.zero_u_deg.to_radians(), instrument.sample.tilt_u_deg.to_radians());
+    (0.5 * zero * zero + tilt * tilt).sqrt()
+}
+
+/// The readings as a sample with this lean met them.
+pub(super) fn turned(readings: &Measurement, turn: DQuat) -> Measurement {
+    let n = readings.len();
+    let (wi, wo): (Vec<DVec3>, Vec<DVec3>) =
+        (0..n).map(|i| readings.directions.pair(i)).map(|(i, o)| (turn * i, turn * o)).unzip();
+    let mut values = readings.values.clone();
+    for (k, value) in values.iter_mut().enumerate() {
+        let i = k % n;
+        if wi[i].z <= 0.0 || wo[i].z <= 0.0 {
+            *value = f64::NAN;
+        }
+    }
+    Measurement {
+        weights: Weights::SolidAngle((0..n).map(|i| readings.weights.get(i)).collect()),
+        sigma: readings.sigma.clone(),
+        ..Measurement::new(readings.name.clone(), Directions::List { wi, wo }, readings.channels.clone(), values)
+    }
+}
+
+/// The model of what is read that `fit` finds once the readings' lean is known; `start` is the one without.
+pub(super) fn found(
+    readings: &Measurement,
+    instrument: &Instrument,
+    start: Surrogate,
+    fit: impl Fn(&Measurement) -> Option<Surrogate>,
+) -> Surrogate {
+    let sigma = sigma(instrument);
+    let (mut lean_now, mut best) = ([0.0; 2], start);
+    let mut least = misfit(readings, &best, lean_now);
+    for _ in 0..ROUNDS {
+        let lean_next = stepped(readings, &best, lean_now, sigma);
+        let Some(next) = fit(&turned(readings, lean(lean_next))) else { break };
+        let left = misfit(readings, &next, lean_next);
+        if left >= least {
+            break;
+        }
+        (lean_now, best, least) = (lean_next, next, left);
+    }
+    best
+}
+
+/// Residual, and its slopes by the lean, of every valid value.
+fn rows<'a>(
+    readings: &'a Measurement,
+    model: &'a Surrogate,
+    at: [f64; 2],
+    step: f64,
+) -> impl Iterator<Item = (f64, Vector2<f64>)> + 'a {
+    let width = readings.channels.len();
+    let frames =
+        [[0.0, 0.0], [step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]].map(|[x, y]| lean([at[0] + x, at[1] + y]));
+    (0..readings.len()).flat_map(move |i| {
+        let (wi, wo) = readings.directions.pair(i);
+        let values = frames.map(|turn| {
+            let mut out = vec![0.0; width];
+            let (wi, wo) = (turn * wi, turn * wo);
+            if wi.z > 0.0 && wo.z > 0.0 {
+                model.write_value(wi, wo, &mut out);
+            }
+            out
+        });
+        (0..width).filter_map(move |c| {
+            let slope = |k: usize| (values[k][c] - values[k + 1][c]) / (2.0 * step);
+            Some((readings.value(c, i)? - values[0][c], Vector2::new(slope(1), slope(3))))
+        })
+    })
+}
+
+/// Sum of squares.
+fn misfit(readings: &Measurement, model: &Surrogate, at: [f64; 2]) -> f64 {
+    rows(readings, model, at, 1e-6).map(|(r, _)| r * r).sum()
+}
+
+/// The lean after one Gauss–Newton step, with the prior that it is 0 ± σ.
+fn stepped(readings: &Measurement, model: &Surrogate, at: [f64; 2], sigma: f64) -> [f64; 2] {
+    let (mut normal, mut right, mut squares, mut count) = (Matrix2::zeros(), Vector2::zeros(), 0.0, 0.0);
+    for (residual, slope) in rows(readings, model, at, STEP * sigma) {
+        normal += slope * slope.transpose();
+        right += slope * residual;
+        squares += residual * residual;
+        count += 1.0;
+    }
+    let prior = squares / f64::max(count - 4.0, 1.0) / (sigma * sigma);
+    let system = normal + Matrix2::identity() * prior;
+    let step = system.cholesky().map_or(Vector2::zeros(), |c| c.solve(&(right - prior * Vector2::from(at))));
+    let shortened = step * (MOST * sigma / step.norm()).min(1.0);
+    [at[0] + shortened.x, at[1] + shortened.y]
+}
