@@ -15,11 +15,15 @@ const ROUNDS: usize = 5;
 /// Steps of a difference quotient, and most of a step, in σ of the lean.
 const STEP: f64 = 0.1;
 const MOST: f64 = 1.5;
+/// σ of the lean beyond which highest readings are something else.
+const FARTHEST: f64 = 4.5;
 
-/// 1 σ of the lean that the readings of this instrument may have, rad: half of what zeros and tilt move a peak by.
+/// 1 σ of the lean that the readings of this instrument may have, rad: half of what zeros, tilt and, at 45°, height move a peak by.
 pub(super) fn sigma(instrument: &Instrument) -> f64 {
     let (zero, tilt) = (instrument.axes.zero_u_deg.to_radians(), instrument.sample.tilt_u_deg.to_radians());
-    (0.5 * zero * zero + tilt * tilt).sqrt()
+    let seen_from = |distance: f64| if distance > 0.0 { instrument.sample.height_u_m / distance } else { 0.0 };
+    let height = seen_from(instrument.source.distance_m).hypot(seen_from(instrument.detector.distance_m));
+    (0.5 * zero * zero + tilt * tilt + 0.125 * height * height).sqrt()
 }
 
 /// The readings as a sample with this lean met them.
@@ -41,26 +45,60 @@ pub(super) fn turned(readings: &Measurement, turn: DQuat) -> Measurement {
     }
 }
 
-/// The model of what is read that `fit` finds once the readings' lean is known; `start` is the one without.
+/// The model of what is read that `fit` finds once the readings' lean is known; `upright` is the one without. Looked for from no lean and from where the
+/// highest readings stand. `matters` says of a model whether a lean counts.
 pub(super) fn found(
     readings: &Measurement,
     instrument: &Instrument,
-    start: Surrogate,
+    upright: Surrogate,
     fit: impl Fn(&Measurement) -> Option<Surrogate>,
-) -> Surrogate {
+    matters: impl Fn(&Surrogate) -> bool,
+) -> Option<Surrogate> {
     let sigma = sigma(instrument);
-    let (mut lean_now, mut best) = ([0.0; 2], start);
-    let mut least = misfit(readings, &best, lean_now);
-    for _ in 0..ROUNDS {
-        let lean_next = stepped(readings, &best, lean_now, sigma);
-        let Some(next) = fit(&turned(readings, lean(lean_next))) else { break };
-        let left = misfit(readings, &next, lean_next);
-        if left >= least {
-            break;
+    let fitted = |at: [f64; 2]| {
+        let model = fit(&turned(readings, lean(at)))?;
+        Some(Found { misfit: misfit(readings, &model, at), model, at })
+    };
+    let upright = Found { misfit: misfit(readings, &upright, [0.0; 2]), model: upright, at: [0.0; 2] };
+    let highest = of_highest(readings).filter(|at| at[0].hypot(at[1]) < FARTHEST * sigma).and_then(fitted);
+    let follow = |found: Found| found.followed(|found| fitted(stepped(readings, &found.model, found.at, sigma)));
+    let starts = [Some(upright), highest].into_iter().flatten();
+    let ends = starts.map(|found| if matters(&found.model) { follow(found) } else { found });
+    ends.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).map(|found| found.model)
+}
+
+/// A lean, the model that goes with it, and the sum of squares that they leave.
+struct Found {
+    at: [f64; 2],
+    model: Surrogate,
+    misfit: f64,
+}
+
+impl Found {
+    /// After steps, as long as each is a better one.
+    fn followed(mut self, step: impl Fn(&Self) -> Option<Self>) -> Self {
+        for _ in 0..ROUNDS {
+            match step(&self) {
+                Some(next) if next.misfit < self.misfit => self = next,
+                _ => break,
+            }
         }
-        (lean_now, best, least) = (lean_next, next, left);
+        self
     }
-    best
+}
+
+/// The lean of the directions half-way between source and detector at readings above half of the highest, by value.
+fn of_highest(readings: &Measurement) -> Option<[f64; 2]> {
+    let value = |i: usize| (0..readings.channels.len()).filter_map(|c| readings.value(c, i)).fold(0.0, f64::max);
+    let highest = (0..readings.len()).map(value).fold(0.0, f64::max);
+    let mut normal = DVec3::ZERO;
+    for i in (0..readings.len()).filter(|i| value(*i) > 0.5 * highest) {
+        let (wi, wo) = readings.directions.pair(i);
+        normal += value(i) * (wi + wo).normalize_or_zero();
+    }
+    // The frame turns that direction to the pole.
+    let normal = normal.try_normalize()?;
+    Some([normal.x, normal.y])
 }
 
 /// Residual, and its slopes by the lean, of every valid value.

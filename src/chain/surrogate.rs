@@ -26,10 +26,11 @@ impl Surrogate {
     /// Fits one to reduced readings, with the lean that they show where that counts. `None` where no fit has an answer.
     pub fn of(readings: &Measurement, instrument: &Instrument) -> Option<Self> {
         let upright = Self::fitted(readings, instrument)?;
-        if readings.dimension == Dimension::Flat || !may_stand_off(&upright.material, instrument) {
+        if readings.dimension == Dimension::Flat || lean::sigma(instrument) == 0.0 {
             return Some(upright);
         }
-        Some(lean::found(readings, instrument, upright, |turned| Self::fitted(turned, instrument)))
+        let fitted = |turned: &Measurement| Self::fitted(turned, instrument);
+        lean::found(readings, instrument, upright, fitted, |model| may_stand_off(&model.material, instrument))
     }
 
     /// A plain fit, unless source and aperture smear a lobe that stands out.
