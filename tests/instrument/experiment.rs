@@ -52,8 +52,8 @@ impl Seen {
 pub struct Outcome {
     /// Reading by reading: error and σ; nothing where it is masked.
     pub readings: Vec<Option<(f64, f64)>>,
-    /// Whether the intervals of kd, ks and n hold them; `None` where there is none.
-    pub parameters: [Option<bool>; 3],
+    /// Whether the intervals of kd, ks and n hold them, of a fit at face value and of one through the instrument; `None` where there is none.
+    pub parameters: [[Option<bool>; 3]; 2],
 }
 
 impl Experiment {
@@ -112,10 +112,10 @@ impl Experiment {
         chain::reduced("study", &self.raw(seed), &self.described).expect("reduced")
     }
 
-    pub fn outcome(&self, seed: u64, through: bool) -> Outcome {
+    pub fn outcome(&self, seed: u64) -> Outcome {
         let m = self.reduced(seed).measurement;
         let readings = (0..m.len()).map(|i| Some((m.value(0, i)? - self.expected(i), sigma(&m, i)))).collect();
-        Outcome { readings, parameters: self.parameters(&m, through) }
+        Outcome { readings, parameters: [false, true].map(|through| self.parameters(&m, through)) }
     }
 
     /// A fit with the σ that the measurement states, at face value or through the instrument.
@@ -176,14 +176,14 @@ pub struct Coverage {
     pub most: (f64, usize),
     /// Width between the 2.5 % and 97.5 % quantiles of the errors, over that of the mean interval: least and most of the readings.
     pub quantiles: (f64, f64),
-    /// Of kd, ks and n.
-    pub parameters: [Option<f64>; 3],
+    /// Of kd, ks and n, at face value and through the instrument.
+    pub parameters: [[Option<f64>; 3]; 2],
     pub readings: usize,
 }
 
-/// Redraws instruments of these seeds; parameters of the first `fits`.
-pub fn coverage(of: &Experiment, seeds: std::ops::Range<u64>, through: bool) -> Coverage {
-    let runs: Vec<Outcome> = seeds.into_par_iter().map(|seed| of.outcome(seed, through)).collect();
+/// Redraws instruments of these seeds.
+pub fn coverage(of: &Experiment, seeds: std::ops::Range<u64>) -> Coverage {
+    let runs: Vec<Outcome> = seeds.into_par_iter().map(|seed| of.outcome(seed)).collect();
     let k = normal_quantile(0.975);
     let list: Vec<(f64, f64, usize)> = (0..of.directions.len())
         .filter_map(|i| {
@@ -200,8 +200,8 @@ pub fn coverage(of: &Experiment, seeds: std::ops::Range<u64>, through: bool) -> 
             _ => Some((*share, *i)),
         })
     };
-    let parameter = |p: usize| {
-        let known: Vec<bool> = runs.iter().filter_map(|run| run.parameters[p]).collect();
+    let parameter = |way: usize, p: usize| {
+        let known: Vec<bool> = runs.iter().filter_map(|run| run.parameters[way][p]).collect();
         (!known.is_empty()).then(|| known.iter().filter(|held| **held).count() as f64 / known.len() as f64)
     };
     Coverage {
@@ -209,7 +209,7 @@ pub fn coverage(of: &Experiment, seeds: std::ops::Range<u64>, through: bool) -> 
         least: by(|a, b| a < b).expect("readings"),
         most: by(|a, b| a > b).expect("readings"),
         quantiles: list.iter().fold((f64::INFINITY, 0.0), |(low, high), l| (l.1.min(low), l.1.max(high))),
-        parameters: [0, 1, 2].map(parameter),
+        parameters: [0, 1].map(|way| [0, 1, 2].map(|p| parameter(way, p))),
         readings: list.len(),
     }
 }

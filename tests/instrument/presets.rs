@@ -97,17 +97,23 @@ fn a_study_s_readings_are_those_of_the_described_instrument() {
     }
 }
 
-/// A share of 0.95 over 200 instruments scatters by 1.5 %, and so does the mean over readings where errors that an instrument keeps make all hold or
-/// miss together; four such steps are allowed. A lobe that cones smear takes a fit through the instrument at each reduction: mirror-like ones, and the
-/// classroom's glossy one, are the study's (`benches/instrument_coverage.rs`).
+/// A share of 0.95 over 100 instruments scatters by 2.2 %, and so does the mean over readings where errors that an instrument keeps make all hold or
+/// miss together; four such steps are allowed. The whole study is `benches/instrument_coverage.rs`. Parameters are those of fits through the
+/// instrument: at face value an aperture biases an exponent.
 #[test]
 fn intervals_of_every_built_in_instrument_hold_the_truth() {
+    let near = |share: f64| (share - 0.95).abs() < 0.088;
     for name in ["standards-lab", "commercial", "robot", "classroom"] {
-        let is_quick = |class: &str| class == "matte" || class == "glossy" && name != "classroom";
-        for (class, truth) in CLASSES.into_iter().filter(|(class, _)| is_quick(class)) {
-            let found = coverage(&Experiment::new(name, truth), 0..200, false);
-            println!("{name}, {class}: {:.1} %, {:.1} % at least", 100.0 * found.mean, 100.0 * found.least.0);
-            assert!((found.mean - 0.95).abs() < 0.062, "{name}, {class}: {}", found.mean);
+        for (class, truth) in CLASSES {
+            let found = coverage(&Experiment::new(name, truth), 0..100);
+            let through = found.parameters[1];
+            println!(
+                "{name}, {class}: {:.1} %, {:.1} % at least; kd, ks, n {through:.2?}",
+                100.0 * found.mean,
+                100.0 * found.least.0
+            );
+            assert!(near(found.mean), "{name}, {class}: {}", found.mean);
+            assert!(through.into_iter().flatten().all(near), "{name}, {class}: {through:?}");
         }
     }
 }
