@@ -130,7 +130,8 @@ fn report(args: &Args, plan: &Plan, table: &Measurement, how: &How, ui: &Ui) {
             e.why = format!("changes readings by {:.1e} at most", spared.bound);
         });
     }
-    let hours = gonio::hours(&plan.instrument, &gonio::lit_rows(&table.directions, plan.scan.rows()));
+    let hours =
+        gonio::hours(&plan.instrument, &table.directions, &gonio::lit_rows(&table.directions, plan.scan.rows()));
     let on: Vec<&str> = effects.iter().filter(|e| e.on).map(|e| e.name).collect();
     let mut text = format!(
         "{}: {} direction pairs, {valid} valid values, scan {}, seed {}, {} h of the instrument; effects: {}",

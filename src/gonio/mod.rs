@@ -24,6 +24,7 @@ pub mod sight;
 mod simulate;
 mod spare;
 mod spec;
+mod travel;
 
 pub use actual::Actual;
 pub use afford::Affordable;
