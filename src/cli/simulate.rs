@@ -12,7 +12,7 @@ use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, w
 use super::simulation::{Plan, What};
 use super::ui::{Ui, significant};
 use crate::chain;
-use crate::gonio::{self, Affordable, Job, Raw, Spared};
+use crate::gonio::{self, Affordable, Job, Raw, Scan, Spared};
 use crate::measurement::Measurement;
 
 #[derive(Debug, clap::Args)]
@@ -57,7 +57,9 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         (table, How::default())
     } else {
         let (raw, how) =
-            chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, |job| read(job, args, ui))?;
+            chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
+                read(job, args, ui)
+            })?;
         if let Some(path) = &args.raw {
             write_text(path, &raw.to_csv(&plan.instrument))?;
         }
@@ -71,6 +73,17 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ui.warn(note);
     }
     how.warn(args, ui);
+    if let Scan::Adaptive { pairs } = plan.scan
+        && table.len() < pairs as usize
+        && !ui.control().stop.requested()
+    {
+        let step = significant(gonio::least_step_deg(&plan.instrument));
+        let found = table.len();
+        ui.warn(&format!(
+            "scan {}: ended with {found} pairs, no gap between readings is wider than two steps of {step}°",
+            plan.scan
+        ));
+    }
     write_measurement(&table, &args.out, format, ui)?;
     if args.out.as_os_str() != "-" {
         report(args, &plan, &table, &how, ui);
