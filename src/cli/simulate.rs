@@ -20,6 +20,7 @@ use crate::measurement::Measurement;
   goniofit simulate --material glossy-paint --scan hemisphere:5 --seed 1 --out paint.csv
   goniofit simulate --material satin --instrument commercial --scan in-plane:5 --raw raw.csv --out satin.csv
   goniofit simulate lab.toml --material satin --auto 1e-4 --target-error 1e-5 --out satin.csv
+  goniofit simulate --material mirror-like --scan adaptive:800 --out mirror.csv
   goniofit simulate --material gold.json --scan merl --noiseless --out gold.binary")]
 pub(super) struct Args {
     #[command(flatten)]

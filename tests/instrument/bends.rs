@@ -60,21 +60,21 @@ pub fn again(table: &Measurement) -> Scan {
     }
 }
 
-/// Signed θo in degrees and value of every valid reading of one incidence, in the order of angles.
+/// Signed θo in degrees and value, NaN where masked, of every reading of one incidence, in the order of angles.
 pub fn curve(table: &Measurement, theta_i_deg: f64) -> Vec<(f64, f64)> {
     let wanted = direction_deg(theta_i_deg, 0.0);
     let mut list: Vec<(f64, f64)> = (0..table.len())
         .filter_map(|i| {
             let (wi, wo) = table.directions.pair(i);
-            let value = table.value(0, i).filter(|_| (wi - wanted).length() < 1e-9)?;
-            Some(((-wo.x).atan2(wo.z).to_degrees(), value))
+            ((wi - wanted).length() < 1e-9).then(|| ((-wo.x).atan2(wo.z).to_degrees(), table.plane(0)[i]))
         })
         .collect();
     list.sort_by(|a, b| a.0.total_cmp(&b.0));
     list
 }
 
-/// Rms over all incidences of the readings' linear interpolation less the truth, over the rms of the truth, every 0.05° from −80° to 80°.
+/// Rms over all incidences of the readings' linear interpolation less the truth, over the rms of the truth, every 0.05° from −80° to 80°, between
+/// readings that are not masked.
 pub fn interpolation_error(table: &Measurement, of: &Material) -> f64 {
     let (mut off, mut all) = (0.0, 0.0);
     for theta_i in (0..6).map(|k| 15.0 * f64::from(k)) {
@@ -84,8 +84,10 @@ pub fn interpolation_error(table: &Measurement, of: &Material) -> f64 {
             let right = curve.partition_point(|c| c.0 < theta).clamp(1, curve.len() - 1);
             let ((a, fa), (b, fb)) = (curve[right - 1], curve[right]);
             let found = fa + (fb - fa) * (theta - a) / (b - a);
-            off += (found - truth).powi(2);
-            all += truth * truth;
+            if found.is_finite() {
+                off += (found - truth).powi(2);
+                all += truth * truth;
+            }
         }
     }
     (off / all).sqrt()
