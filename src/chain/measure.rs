@@ -1,11 +1,13 @@
 //! Anything that reflects, on the simulated instrument's sample holder.
 
+use std::borrow::Cow;
+
 use super::error::ChainError;
 use super::source::Source;
 use super::surrogate::Surrogate;
 use crate::brdf::{Brdf, Material};
 use crate::control::Control;
-use crate::gonio::{ACCURACY, Instrument, Job, Raw, Reduction, Scan, Truth, reduce, simulate};
+use crate::gonio::{ACCURACY, Adaptive, Instrument, Job, Look, Raw, Reduction, Scan, Truth, adapt, reduce, simulate};
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
 
@@ -27,7 +29,32 @@ pub fn measure(
         measurement.origin = format!("simulated, scan {scan}, seed {seed}");
         return Ok(measurement);
     }
-    with_truth(name, source, scan, |truth, channels| simulate(name, truth, channels, instrument, scan, seed, control))
+    let mut measurement = with_truth(name, source, scan, |truth, channels| {
+        let read = |scan: &Scan, control: Control<'_>| simulate(name, truth, channels, instrument, scan, seed, control);
+        let look = |scan: &Scan, control: Control<'_>| {
+            let table = read(scan, control)?;
+            Some(Look { table, time_s: Vec::new(), saturated: Vec::new() })
+        };
+        read(&chosen(scan, source, instrument, control, look), control)
+    })?;
+    measurement.origin = format!("simulated, scan {scan}, seed {seed}");
+    Ok(measurement)
+}
+
+/// The scan itself; an adaptive one as the list that what `look` reads makes of it.
+fn chosen<'s>(
+    scan: &'s Scan,
+    source: &Source,
+    instrument: &Instrument,
+    control: Control<'_>,
+    look: impl Fn(&Scan, Control<'_>) -> Option<Look>,
+) -> Cow<'s, Scan> {
+    match *scan {
+        Scan::Adaptive { pairs } => {
+            Cow::Owned(adapt(&Adaptive { pairs, dimension: source.dimension(), instrument }, control, look))
+        }
+        _ => Cow::Borrowed(scan),
+    }
 }
 
 /// Raw readings of a material or table along a scan.
@@ -42,10 +69,11 @@ pub fn measure_raw(
     seed: u64,
     control: Control<'_>,
 ) -> Result<Raw, ChainError> {
-    with_job(name, source, instrument, scan, seed, |job| job.run(control))
+    with_job(name, source, instrument, scan, seed, control, |job| job.run(control))
 }
 
-/// What `work` makes of the simulation of a material or table along a scan.
+/// What `work` makes of the simulation of a material or table along a scan. The directions of an adaptive one are chosen before, by readings with all
+/// effects.
 ///
 /// # Errors
 /// As [`measure`].
@@ -55,13 +83,20 @@ pub fn with_job<T>(
     instrument: &Instrument,
     scan: &Scan,
     seed: u64,
+    control: Control<'_>,
     work: impl FnOnce(&Job<'_>) -> T,
 ) -> Result<T, ChainError> {
     with_truth(name, source, scan, |truth, channels| {
-        let (directions, weights) = scan.directions()?;
-        let (directions, weights) = (&directions, &weights);
-        let (dimension, accuracy) = (scan.dimension(), ACCURACY);
-        let (rows, left_out) = (scan.rows(), &[][..]);
+        let (accuracy, left_out) = (ACCURACY, &[][..]);
+        let look = |scan: &Scan, control: Control<'_>| {
+            let (directions, weights) = &scan.directions()?;
+            let (dimension, rows) = (scan.dimension(), scan.rows());
+            Job { truth, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out }
+                .look(control)
+        };
+        let scan = chosen(scan, source, instrument, control, look);
+        let (directions, weights) = &scan.directions()?;
+        let (dimension, rows) = (scan.dimension(), scan.rows());
         Some(work(&Job { truth, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out }))
     })
 }
@@ -97,7 +132,7 @@ fn with_truth<T>(
     let too_large = || ChainError::ScanTooLarge { scan: scan.to_string() };
     match source {
         Source::Fitted(material) => {
-            same_world(name, material.is_flat(), scan.dimension())?;
+            same_world(name, source, scan)?;
             let truth = |wi, wo, out: &mut [f64]| {
                 material.write_value(wi, wo, out);
                 true
@@ -105,7 +140,7 @@ fn with_truth<T>(
             work(&truth, &material.channels).ok_or_else(too_large)
         }
         Source::Measured(table) => {
-            same_world(name, table.dimension == Dimension::Flat, scan.dimension())?;
+            same_world(name, source, scan)?;
             let all: Vec<usize> = (0..table.channels.len()).collect();
             let brdf = TableBrdf::new(table, &all)?;
             let truth = |wi, wo, out: &mut [f64]| brdf.eval(wi, wo, out);
@@ -125,13 +160,14 @@ pub fn tabulate(name: &str, material: &Material, scan: &Scan, control: Control<'
     Ok(table)
 }
 
-fn same_world(name: &str, flat: bool, scan: Dimension) -> Result<(), ChainError> {
-    match (flat, scan) {
-        (true, Dimension::Space) => {
-            Err(ChainError::Mismatch(format!("{name} belongs to the flat world: measure it with --scan flat")))
-        }
-        (false, Dimension::Flat) => Err(ChainError::Mismatch(format!(
-            "{name} belongs to space, the flat scan does not: choose in-plane, hemisphere or merl"
+fn same_world(name: &str, source: &Source, scan: &Scan) -> Result<(), ChainError> {
+    match (source.dimension(), scan.dimension()) {
+        _ if matches!(scan, Scan::Adaptive { .. }) => Ok(()),
+        (Dimension::Flat, Dimension::Space) => Err(ChainError::Mismatch(format!(
+            "{name} belongs to the flat world: measure it with --scan flat or adaptive"
+        ))),
+        (Dimension::Space, Dimension::Flat) => Err(ChainError::Mismatch(format!(
+            "{name} belongs to space, the flat scan does not: choose in-plane, adaptive, hemisphere or merl"
         ))),
         _ => Ok(()),
     }

@@ -8,7 +8,7 @@ use super::error::ChainError;
 use super::library::{BuiltInMaterial, MATERIALS};
 use crate::brdf::{Brdf, Material};
 use crate::measurement::interpolate::TableBrdf;
-use crate::measurement::{Measurement, ReadOptions, formats};
+use crate::measurement::{Dimension, Measurement, ReadOptions, formats};
 use crate::render;
 
 /// What a name or file turned out to be.
@@ -27,6 +27,16 @@ impl Source {
         match self {
             Self::Fitted(m) => &m.channels,
             Self::Measured(m) => &m.channels,
+        }
+    }
+
+    /// The world that it belongs to.
+    #[must_use]
+    pub fn dimension(&self) -> Dimension {
+        match self {
+            Self::Fitted(m) if m.is_flat() => Dimension::Flat,
+            Self::Fitted(_) => Dimension::Space,
+            Self::Measured(m) => m.dimension,
         }
     }
 }

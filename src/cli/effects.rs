@@ -22,7 +22,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let plan = Plan::new(&args.what, None)?;
     let (source, name) = plan.load()?;
-    let found = chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, |job| {
+    let found = chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
         job.contributions(ui.control())
     })?;
     let object = json!({

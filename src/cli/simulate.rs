@@ -12,7 +12,7 @@ use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, w
 use super::simulation::{Plan, What};
 use super::ui::{Ui, significant};
 use crate::chain;
-use crate::gonio::{self, Affordable, Job, Raw, Spared};
+use crate::gonio::{self, Affordable, Job, Raw, Scan, Spared};
 use crate::measurement::Measurement;
 
 #[derive(Debug, clap::Args)]
@@ -20,6 +20,7 @@ use crate::measurement::Measurement;
   goniofit simulate --material glossy-paint --scan hemisphere:5 --seed 1 --out paint.csv
   goniofit simulate --material satin --instrument commercial --scan in-plane:5 --raw raw.csv --out satin.csv
   goniofit simulate lab.toml --material satin --auto 1e-4 --target-error 1e-5 --out satin.csv
+  goniofit simulate --material mirror-like --scan adaptive:800 --out mirror.csv
   goniofit simulate --material gold.json --scan merl --noiseless --out gold.binary")]
 pub(super) struct Args {
     #[command(flatten)]
@@ -57,7 +58,9 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         (table, How::default())
     } else {
         let (raw, how) =
-            chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, |job| read(job, args, ui))?;
+            chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
+                read(job, args, ui)
+            })?;
         if let Some(path) = &args.raw {
             write_text(path, &raw.to_csv(&plan.instrument))?;
         }
@@ -71,6 +74,17 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ui.warn(note);
     }
     how.warn(args, ui);
+    if let Scan::Adaptive { pairs } = plan.scan
+        && table.len() < pairs as usize
+        && !ui.control().stop.requested()
+    {
+        let step = significant(gonio::least_step_deg(&plan.instrument));
+        let found = table.len();
+        ui.warn(&format!(
+            "scan {}: ended with {found} pairs, no gap between readings is wider than two steps of {step}°",
+            plan.scan
+        ));
+    }
     write_measurement(&table, &args.out, format, ui)?;
     if args.out.as_os_str() != "-" {
         report(args, &plan, &table, &how, ui);
@@ -130,7 +144,8 @@ fn report(args: &Args, plan: &Plan, table: &Measurement, how: &How, ui: &Ui) {
             e.why = format!("changes readings by {:.1e} at most", spared.bound);
         });
     }
-    let hours = gonio::hours(&plan.instrument, &gonio::lit_rows(&table.directions, plan.scan.rows()));
+    let hours =
+        gonio::hours(&plan.instrument, &table.directions, &gonio::lit_rows(&table.directions, plan.scan.rows()));
     let on: Vec<&str> = effects.iter().filter(|e| e.on).map(|e| e.name).collect();
     let mut text = format!(
         "{}: {} direction pairs, {valid} valid values, scan {}, seed {}, {} h of the instrument; effects: {}",

@@ -17,8 +17,9 @@ pub(super) struct What {
     /// The truth: a built-in material (see `goniofit models`), a fitted .json or a measurement
     #[arg(long, value_name = "M")]
     pub material: Option<String>,
-    /// Where to measure: in-plane[:STEP], hemisphere[:STEP], flat[:STEP] (degrees), merl, or list:FILE with the directions in a
-    /// CSV or in another measurement [default: hemisphere:5]
+    /// Where to measure: in-plane[:STEP], hemisphere[:STEP], flat[:STEP] (degrees), merl, adaptive[:N] (N pairs in the plane of
+    /// incidence, 500 if not said, denser where readings bend), or list:FILE with the directions in a CSV or in another measurement
+    /// [default: hemisphere:5]
     #[arg(long, value_name = "S")]
     pub scan: Option<String>,
     /// Seed of the noise [default: 0]

@@ -63,7 +63,7 @@ impl Job<'_> {
 
     /// The readings that are to be made, and what the instrument is really like.
     pub(super) fn prepare(&self) -> (Vec<Reading>, Actual) {
-        let readings = series(self.instrument, &lit_rows(self.directions, self.rows));
+        let readings = series(self.instrument, self.directions, &lit_rows(self.directions, self.rows));
         let actual = Actual::draw(self.instrument, &readings, self.seed).within(self.dimension);
         (readings, actual)
     }

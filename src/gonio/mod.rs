@@ -5,6 +5,7 @@
 //! (seed, channel, position in the scan), so it depends on neither threads nor order; an instrument's own errors are keyed by the seed.
 
 mod actual;
+mod adaptive;
 mod afford;
 mod contribution;
 mod cost;
@@ -19,13 +20,16 @@ mod raw_file;
 mod reading;
 mod reduce;
 mod scan;
+mod scan_name;
 mod series;
 pub mod sight;
 mod simulate;
 mod spare;
 mod spec;
+mod travel;
 
 pub use actual::Actual;
+pub use adaptive::{Adaptive, Look, adapt, least_step_deg};
 pub use afford::Affordable;
 pub use contribution::{Change, Contribution, Contributions};
 pub use cost::{hours, seconds};
@@ -37,7 +41,8 @@ pub use presets::{PRESETS, Preset};
 pub use raw::Raw;
 pub use reading::{Kind, Reading};
 pub use reduce::{Budget, Line, ReduceError, Reduction, Type, reduce};
-pub use scan::{Scan, ScanError};
+pub use scan::Scan;
+pub use scan_name::ScanError;
 pub use series::series;
 pub use simulate::{Truth, simulate};
 pub use spare::Spared;

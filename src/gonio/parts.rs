@@ -5,6 +5,8 @@
 
 /// Seconds of the detector's shortest useful exposure, and metres of its shortest distance.
 const LEAST: f64 = 1e-9;
+/// Degrees a second of the slowest axis: half a turn takes two days.
+const SLOWEST: f64 = 1e-3;
 
 /// The source and its beam.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -112,8 +114,10 @@ pub struct Axes {
     pub zero_u_deg: f64,
     /// Standard deviation of where an axis stops, degrees: a new error at each stop.
     pub jitter_deg: f64,
-    /// Seconds to move to the next pair of directions.
+    /// Seconds to move to the next pair of directions, however far.
     pub move_s: f64,
+    /// How fast an axis turns, degrees a second: the angle that the farthest travels adds its time to `move_s`; 0 adds none.
+    pub degrees_per_s: f64,
 }
 
 /// Light and shadow that do not belong to the sample.
@@ -241,8 +245,17 @@ impl Axes {
     /// What is wrong with the numbers, if anything.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
-        let Self { zero_u_deg, jitter_deg, move_s } = *self;
-        check("axes", &[("zero_u_deg", zero_u_deg, 10.0), ("jitter_deg", jitter_deg, 10.0), ("move_s", move_s, 1e6)])
+        let Self { zero_u_deg, jitter_deg, move_s, degrees_per_s } = *self;
+        let slowest = (degrees_per_s > 0.0 && degrees_per_s < SLOWEST).then(|| {
+            format!("instrument.axes.degrees_per_s: expected 0 (moves take move_s alone) or from {SLOWEST} to 1e6, found {degrees_per_s:e}")
+        });
+        let numbers = [
+            ("zero_u_deg", zero_u_deg, 10.0),
+            ("jitter_deg", jitter_deg, 10.0),
+            ("move_s", move_s, 1e6),
+            ("degrees_per_s", degrees_per_s, 1e6),
+        ];
+        check("axes", &numbers).or(slowest)
     }
 }
 

@@ -1,8 +1,6 @@
 //! Where the instrument measures: pairs of directions, with the solid angle that each stands for.
 
 use std::collections::HashMap;
-use std::fmt;
-use std::str::FromStr;
 
 use glam::DVec3;
 
@@ -30,6 +28,12 @@ pub enum Scan {
         /// Step of both angles, degrees.
         step_deg: f64,
     },
+    /// The plane of incidence, denser where readings bend: so many pairs of directions, chosen while they are read ([`super::adapt`]). It belongs to
+    /// either world.
+    Adaptive {
+        /// How many.
+        pairs: u32,
+    },
     /// Directions and weights of another measurement.
     List {
         /// What it is called.
@@ -45,52 +49,16 @@ pub enum Scan {
     },
 }
 
-/// Why a text is no scan.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "scan \"{text}\": expected in-plane[:STEP], hemisphere[:STEP], flat[:STEP] (STEP in degrees, 0.1 to 45), merl or list:FILE"
-)]
-pub struct ScanError {
-    text: String,
-}
-
-impl FromStr for Scan {
-    type Err = ScanError;
-
-    fn from_str(text: &str) -> Result<Self, ScanError> {
-        let wrong = || ScanError { text: text.to_owned() };
-        let (kind, step) = text.split_once(':').map_or((text, None), |(k, s)| (k, Some(s)));
-        let step = |default: f64| match step {
-            None => Ok(default),
-            Some(s) => s.parse::<f64>().ok().filter(|v| (0.1..=45.0).contains(v)).ok_or_else(wrong),
-        };
-        match kind {
-            "in-plane" => Ok(Self::InPlane { step_deg: step(1.0)? }),
-            "hemisphere" => Ok(Self::Hemisphere { step_deg: step(5.0)? }),
-            "flat" => Ok(Self::Flat { step_deg: step(1.0)? }),
-            "merl" if text == "merl" => Ok(Self::Merl),
-            _ => Err(wrong()),
-        }
-    }
-}
-
-impl fmt::Display for Scan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::InPlane { step_deg } => write!(f, "in-plane:{step_deg}"),
-            Self::Hemisphere { step_deg } => write!(f, "hemisphere:{step_deg}"),
-            Self::Flat { step_deg } => write!(f, "flat:{step_deg}"),
-            Self::Merl => f.write_str("merl"),
-            Self::List { name, .. } => write!(f, "list:{name}"),
-        }
-    }
-}
+/// Incidences of scans in the plane of incidence, degrees.
+pub(super) const IN_PLANE_DEG: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
+/// How far the detector goes to each side of the normal in them, degrees.
+pub(super) const MOST_DEG: f64 = 85.0;
 
 /// Most entries a scan may have: 16 million pairs with three channels take about 2.5 GB.
 const MOST: f64 = 16e6;
 
 impl Scan {
-    /// Flat world or space.
+    /// Flat world or space; an adaptive scan belongs to that of the material.
     #[must_use]
     pub fn dimension(&self) -> Dimension {
         match self {
@@ -125,19 +93,20 @@ impl Scan {
         }
     }
 
-    /// The pairs of directions and what each stands for; `None` where the step asks for more than 16 million.
+    /// The pairs of directions and what each stands for; `None` where the step asks for more than 16 million, and of an adaptive scan,
+    /// which is a list once it is chosen.
     #[must_use]
     pub fn directions(&self) -> Option<(Directions, Weights)> {
         match self {
             Self::InPlane { step_deg } => {
-                let incidences: Vec<f64> = (0..6).map(|k| 15.0 * f64::from(k)).collect();
-                Some((plane_pairs(&incidences, &symmetric_steps(*step_deg)), Weights::Uniform))
+                Some((plane_pairs(&IN_PLANE_DEG, &symmetric_steps(*step_deg)), Weights::Uniform))
             }
             Self::Flat { step_deg } => {
                 let angles = symmetric_steps(*step_deg);
                 Some((plane_pairs(&angles, &angles), Weights::Uniform))
             }
             Self::Hemisphere { step_deg } => hemisphere(*step_deg),
+            Self::Adaptive { .. } => None,
             Self::Merl => Some((Directions::Merl(MerlGrid::default()), Weights::Merl)),
             Self::List { directions, weights, .. } => Some((directions.clone(), weights.clone())),
         }
@@ -170,7 +139,7 @@ fn kept_weights(weights: Weights, kept: &[usize]) -> Weights {
 
 /// −85° … 85° in steps, 0 among them.
 fn symmetric_steps(step_deg: f64) -> Vec<f64> {
-    let most = (85.0 / step_deg + 1e-9).floor() as i64;
+    let most = (MOST_DEG / step_deg + 1e-9).floor() as i64;
     (-most..=most).map(|k| k as f64 * step_deg).collect()
 }
 
@@ -218,16 +187,6 @@ fn hemisphere(step_deg: f64) -> Option<(Directions, Weights)> {
 mod tests {
     use super::*;
     use crate::geometry::mirror;
-
-    #[test]
-    fn names_read_back_and_wrong_ones_say_what_is_known() {
-        for text in ["in-plane:2", "hemisphere:7.5", "merl", "flat:1"] {
-            assert_eq!(text.parse::<Scan>().expect(text).to_string(), text);
-        }
-        for text in ["sphere", "merl:3", "hemisphere:0", "hemisphere:NaN", "in-plane:-1", ""] {
-            assert!(text.parse::<Scan>().expect_err(text).to_string().contains("hemisphere[:STEP]"));
-        }
-    }
 
     #[test]
     fn a_hemisphere_scan_s_weights_add_up_to_both_hemispheres() {

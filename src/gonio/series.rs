@@ -2,15 +2,18 @@
 
 use super::instrument::Instrument;
 use super::reading::{Kind, Reading};
+use super::travel::{Moves, Place};
+use crate::measurement::Directions;
 
-/// The readings that measure these pairs of directions, in order of time. A pair that follows itself is one stop, read as often.
+/// The readings that measure these of the pairs of directions, in order of time. A pair that follows itself is one stop, read as often.
 #[must_use]
-pub fn series(instrument: &Instrument, entries: &[u32]) -> Vec<Reading> {
-    let mut list = Series { instrument, clock: 0.0, stop: 0, readings: Vec::new() };
+pub fn series(instrument: &Instrument, directions: &Directions, entries: &[u32]) -> Vec<Reading> {
+    let moves = Moves::new(instrument, directions);
+    let mut list = Series { instrument, moves, at: None, clock: 0.0, stop: 0, readings: Vec::new() };
     for block in entries.chunks(instrument.protocol.block as usize) {
         list.visit();
         for same in block.chunk_by(|a, b| a == b) {
-            list.turn(instrument.axes.move_s);
+            same.iter().take(1).for_each(|&entry| list.go(list.moves.place(entry)));
             let times = instrument.readings.saturating_mul(same.len() as u32);
             for &exposure_s in &instrument.detector.exposures_s {
                 list.read(Kind::Sample, same.first().copied(), exposure_s, times);
@@ -23,14 +26,18 @@ pub fn series(instrument: &Instrument, entries: &[u32]) -> Vec<Reading> {
 
 struct Series<'a> {
     instrument: &'a Instrument,
+    moves: Moves<'a>,
+    /// Where the axes stand; not known before the first move.
+    at: Option<Place>,
     clock: f64,
     stop: u32,
     readings: Vec<Reading>,
 }
 
 impl Series<'_> {
-    fn turn(&mut self, seconds: f64) {
-        self.clock += seconds;
+    /// Moves the axes.
+    fn go(&mut self, to: Place) {
+        self.clock += self.moves.seconds(self.at.replace(to), to);
         self.stop += 1;
     }
 
@@ -48,17 +55,17 @@ impl Series<'_> {
         let longest = exposures.last().copied().unwrap_or(1.0);
         let repeats = instrument.protocol.repeats;
         if instrument.has_reference() {
-            self.turn(instrument.axes.move_s);
+            self.go(self.moves.reference());
             for &exposure in exposures {
                 self.read(Kind::Reference, None, exposure, repeats);
             }
         }
         if instrument.surroundings.stray_per_sr > 0.0 {
-            self.turn(0.0);
+            self.stop += 1;
             self.read(Kind::Blank, None, longest, repeats);
         }
         if instrument.has_dark() {
-            self.turn(0.0);
+            self.stop += 1;
             self.read(Kind::Dark, None, longest, repeats);
         }
     }
@@ -67,6 +74,7 @@ impl Series<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gonio::Scan;
     use crate::gonio::parts::{Detector, Protocol, Reference};
 
     #[test]
@@ -79,17 +87,18 @@ mod tests {
             ..Instrument::default()
         };
         let pairs: Vec<u32> = (0..10).collect();
-        let list = series(&instrument, &pairs);
+        let directions = Scan::InPlane { step_deg: 45.0 }.directions().expect("small").0;
+        let list = series(&instrument, &directions, &pairs);
         let count = |kind| list.iter().filter(|r| r.kind == kind).count();
         // Three blocks and the end: four visits, the reference in both exposures, the dark in the longer one.
         assert_eq!(Kind::ALL.map(count), [40, 0, 24, 12]);
         assert!(list.windows(2).all(|r| r[0].time_s < r[1].time_s));
         let entries: Vec<u32> = list.iter().filter_map(|r| r.entry).collect();
         assert!(entries.is_sorted() && entries.last() == Some(&9));
-        assert!(series(&Instrument::noiseless(), &pairs).iter().all(|r| r.kind == Kind::Sample));
+        assert!(series(&Instrument::noiseless(), &directions, &pairs).iter().all(|r| r.kind == Kind::Sample));
         // Of three in a row one lies in the next block, behind a visit and another move.
         let stops = |rows: &[u32]| {
-            let list = series(&instrument, rows);
+            let list = series(&instrument, &directions, rows);
             let mut stops: Vec<u32> = list.iter().filter(|r| r.kind == Kind::Sample).map(|r| r.stop).collect();
             stops.dedup();
             (stops.len(), list.iter().filter(|r| r.kind == Kind::Sample).count())

@@ -14,7 +14,8 @@ use crate::numeric::sum::BLOCK;
 pub type Truth<'a> = dyn Fn(DVec3, DVec3, &mut [f64]) -> bool + Sync + 'a;
 
 /// Measures a material with channels of these names by an instrument along a scan. Directions below the horizon, and those
-/// where the truth is not known, are masked. `None` where the scan has too many entries.
+/// where the truth is not known, are masked. `None` where the scan has too many entries, or is
+/// adaptive and not chosen yet ([`super::adapt`]).
 pub fn simulate(
     name: &str,
     truth: &Truth<'_>,

@@ -14,7 +14,7 @@ pub struct SimulationSpec {
     /// A built-in material or a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// `in-plane[:STEP]`, `hemisphere[:STEP]`, `merl`, `flat[:STEP]` or `list:FILE`.
+    /// `in-plane[:STEP]`, `adaptive[:N]`, `hemisphere[:STEP]`, `merl`, `flat[:STEP]` or `list:FILE`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan: Option<String>,
     /// Seed of the noise.

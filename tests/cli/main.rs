@@ -1,6 +1,7 @@
 //! The `goniofit` command as a user meets it: files, streams, exit codes. The contract is the command line, not the library.
 #![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)] // helpers of tests
 
+mod adaptive;
 mod bench;
 mod chain;
 mod effects;

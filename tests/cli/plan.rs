@@ -45,6 +45,35 @@ fn a_plan_is_a_scan_that_keeps_its_budget_and_is_measured_as_planned() {
     assert!(!fit.to_string().contains("undetermined\":[\""), "{fit}");
 }
 
+/// What axes take to turn is paid for, to the second: the plan keeps its budget and costs what its readings' clock says.
+#[test]
+fn axes_that_turn_slowly_cost_a_plan_what_they_cost_its_scan() {
+    let b = Bench::new();
+    b.write("slow.toml", LAB.replace("move_s = 2", "move_s = 2\ndegrees_per_s = 4"));
+    b.write("lab.toml", LAB);
+    let plan = |lab: &str| {
+        let said = b.json(&["plan", "--budget", "30min", "--instrument", lab, "--out", "scan.csv"]);
+        let args = ["--material", "satin", "--instrument", lab, "--scan", "list:scan.csv", "--raw", "raw.csv"];
+        let measured = b.json(&[&["simulate"][..], &args, &["--out", "m.csv"]].concat());
+        let hours = number(&said["scans"][0]["hours"]);
+        assert!((number(&measured["instrument_hours"]) - hours).abs() < 1e-9, "{lab}: {hours}");
+        assert!(hours <= 0.5 && hours > 0.48, "{lab}: {hours}");
+        // The end of the last reading.
+        let text = b.text("raw.csv");
+        let heads: Vec<&str> = text.lines().find(|l| !l.starts_with('#')).expect("a header").split(',').collect();
+        let last: Vec<&str> = text.lines().last().expect("rows").split(',').collect();
+        let column = |name: &str| last[heads.iter().position(|h| *h == name).expect(name)].parse::<f64>().expect(name);
+        let end = column("time_s") + column("exposure_s");
+        assert!((end / 3600.0 - hours).abs() < 1e-6, "{lab}: {end} s, {hours} h");
+        number(&said["scans"][0]["readings"])
+    };
+    let (fast, slow) = (plan("lab.toml"), plan("slow.toml"));
+    assert!(slow < fast, "{slow} {fast}");
+    b.write("wrong.toml", LAB.replace("move_s = 2", "degrees_per_s = -1"));
+    let ran = b.run(&["plan", "--budget", "1h", "--instrument", "wrong.toml", "--out", "s.csv"]);
+    assert!(ran.code == Some(2) && ran.err.contains("axes.degrees_per_s"), "{}", ran.err);
+}
+
 #[test]
 fn the_same_plan_whatever_the_threads_and_a_table_for_people() {
     let b = Bench::new();

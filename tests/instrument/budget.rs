@@ -28,7 +28,7 @@ const NOISE: [&str; 5] = ["shot noise", "read noise", "quantisation", "axis jitt
 /// Standard deviation of every reading about its mean over draws of one error.
 fn scatter(of: &Experiment, draw: impl Fn(&[Reading], u64) -> Actual + Sync, left_out: &[&str]) -> Vec<f64> {
     let entries: Vec<u32> = (0..of.directions.len() as u32).collect();
-    let readings = series(&of.bare, &entries);
+    let readings = series(&of.bare, &of.directions, &entries);
     let one = |seed: u64| {
         of.with_job(&of.bare, seed, |job| {
             let raw = Job { left_out, ..*job }.read(readings.clone(), &draw(&readings, seed), Control::silent());

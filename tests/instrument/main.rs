@@ -3,6 +3,8 @@
 // Tests may fail loudly.
 #![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
 
+mod adaptive;
+mod bends;
 mod budget;
 mod cones;
 mod contributions;

@@ -20,7 +20,7 @@ pub fn prior() -> Prior {
 /// The hours that a scan takes.
 pub fn hours_of(scan: &Scan, instrument: &Instrument) -> f64 {
     let (directions, _) = scan.directions().expect("small");
-    hours(instrument, &lit_rows(&directions, scan.rows()))
+    hours(instrument, &directions, &lit_rows(&directions, scan.rows()))
 }
 
 /// The plan for so many hours.

@@ -56,7 +56,7 @@ pub fn lab() -> Instrument {
 pub fn crooked() -> Instrument {
     Instrument {
         sample: Holder { height_u_m: 2e-4, tilt_u_deg: 0.05, ..Holder::default() },
-        axes: Axes { zero_u_deg: 0.05, jitter_deg: 0.02, move_s: 2.0 },
+        axes: Axes { zero_u_deg: 0.05, jitter_deg: 0.02, ..lab().axes },
         detector: Detector { distance_m: 0.5, ..lab().detector },
         ..lab()
     }
@@ -70,7 +70,7 @@ pub fn read(of: &Material, instrument: &Instrument, scan: &(Directions, Weights)
 /// Raw readings by an instrument without errors of its own.
 pub fn read_nominal(of: &Material, instrument: &Instrument, scan: &(Directions, Weights)) -> Raw {
     let entries: Vec<u32> = (0..scan.0.len() as u32).collect();
-    let readings = series(instrument, &entries);
+    let readings = series(instrument, &scan.0, &entries);
     with_job(of, instrument, scan, 0, &[], |job| job.read(readings, &Actual::nominal(), Control::silent()))
 }
 

@@ -9,6 +9,7 @@ use super::rounding::{self, Share};
 use crate::geometry::angles::{phi_of, theta_of};
 use crate::gonio::cost::{dwell_s, visit_s};
 use crate::gonio::instrument::Instrument;
+use crate::gonio::travel::move_s;
 use crate::measurement::Directions;
 
 /// What a plan is made for.
@@ -59,18 +60,19 @@ pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
     }
     let pairs = candidates::pairs(prior.sharpest(), instrument);
     let draws = prior.planned_for();
-    let (stops, mut table) = tell(prior, instrument, &pairs, &draws);
+    let usual_s = usual_move_s(instrument, &pairs);
+    let (stops, mut table) = tell(prior, instrument, usual_s, &pairs, &draws);
     let open = || Wrong::Undetermined(prior.model().clone());
     let undetermined = table.drop_undetermined();
     let optimum = if table.draws.is_empty() { None } else { best(&table) }.ok_or_else(open)?;
-    let (kept, weights) = supported(&table, &optimum, affordable(wish));
+    let (kept, weights) = supported(&table, &optimum, affordable(wish, usual_s));
     let share = |(&x, weight): (&usize, &f64)| Share { weight: *weight, ..stops[x] };
     let mut chosen: Vec<(Pair, Share)> = kept.iter().zip(&weights).map(|of| (pairs[*of.0], share(of))).collect();
     chosen.sort_by(|a, b| place(a.0).partial_cmp(&place(b.0)).unwrap_or(std::cmp::Ordering::Equal));
     let shares: Vec<Share> = chosen.iter().map(|c| c.1).collect();
-    let rows = rounding::rows(&shares, instrument, budget_s)?;
     let (wi, wo) = chosen.iter().map(|c| c.0).unzip();
     let directions = Directions::List { wi, wo };
+    let rows = rounding::rows(&shares, &directions, instrument, budget_s)?;
     Ok(Plan {
         precision: precision(prior, instrument, &directions, &rows),
         directions,
@@ -97,10 +99,19 @@ fn place((wi, wo): Pair) -> [f64; 3] {
     [theta_of(wi), (side * phi_of(side * wo)).abs(), side * theta_of(wo)]
 }
 
+/// Seconds of a move as a plan makes it: the mean over a round through candidates, as many as a plan has at most and evenly spread, in the order of
+/// reading. How far one moves depends on what is chosen, which is chosen by what a stop costs: this is taken for every stop.
+fn usual_move_s(instrument: &Instrument, pairs: &[Pair]) -> f64 {
+    let mut sorted = pairs.to_vec();
+    sorted.sort_by(|a, b| place(*a).partial_cmp(&place(*b)).unwrap_or(std::cmp::Ordering::Equal));
+    let round: Vec<Pair> = sorted.into_iter().step_by(pairs.len().div_ceil(MOST_PAIRS).max(1)).collect();
+    let next = round.iter().cycle().skip(1);
+    round.iter().zip(next).map(|(a, b)| move_s(instrument, *a, *b)).sum::<f64>() / round.len().max(1) as f64
+}
+
 /// How many pairs the budget lets the axes stop at.
-fn affordable(wish: &Wish<'_>) -> usize {
+fn affordable(wish: &Wish<'_>, move_s: f64) -> usize {
     let time = (wish.budget_s - 2.0 * visit_s(wish.instrument)).max(0.0);
-    let move_s = wish.instrument.axes.move_s;
     let stop_s = move_s + dwell_s(wish.instrument);
     // A move of 0 s leaves infinitely many, which the clamp ends.
     let most = (MOVES * time / move_s).min(FIRST * time / stop_s) as usize;
@@ -108,7 +119,13 @@ fn affordable(wish: &Wish<'_>) -> usize {
 }
 
 /// How each candidate is best read, and what it tells a second.
-fn tell(prior: &Prior, instrument: &Instrument, pairs: &[Pair], draws: &[Vec<f64>]) -> (Vec<Share>, Table) {
+fn tell(
+    prior: &Prior,
+    instrument: &Instrument,
+    move_s: f64,
+    pairs: &[Pair],
+    draws: &[Vec<f64>],
+) -> (Vec<Share>, Table) {
     let (model, noise) = (Model::of(prior), Noise::of(instrument));
     let p = model.parameters();
     let mut told = vec![Vec::with_capacity(pairs.len() * p); draws.len()];
@@ -122,7 +139,8 @@ fn tell(prior: &Prior, instrument: &Instrument, pairs: &[Pair], draws: &[Vec<f64
                 (f, noise.variance(f, *pair), noise.jitter(&model, draw, f, *pair))
             })
             .collect();
-        let stop = length(instrument, values.iter().filter_map(|(_, own, jitter)| own.map(|own| (own, *jitter))));
+        let stop =
+            length(instrument, move_s, values.iter().filter_map(|(_, own, jitter)| own.map(|own| (own, *jitter))));
         for ((list, draw), (_, own, jitter)) in told.iter_mut().zip(draws).zip(&values) {
             model.value(draw, *pair, &mut gradient);
             // All rows of a stop share its jitter.
@@ -137,7 +155,7 @@ fn tell(prior: &Prior, instrument: &Instrument, pairs: &[Pair], draws: &[Vec<f64
 
 /// How many rows a stop is best read: longer where noise is large against jitter and moves are dear. A stop costs move + k dwell and leaves
 /// jitter + noise/k: their product is least at k² = move noise/(dwell jitter).
-fn length(instrument: &Instrument, variances: impl Iterator<Item = (f64, f64)>) -> Share {
+fn length(instrument: &Instrument, move_s: f64, variances: impl Iterator<Item = (f64, f64)>) -> Share {
     let block = instrument.protocol.block;
     let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(block);
     let (mut sum, mut count) = (0.0, 0u32);
@@ -149,9 +167,9 @@ fn length(instrument: &Instrument, variances: impl Iterator<Item = (f64, f64)>) 
         return Share { weight: 0.0, row_s, rows_per_stop: block };
     }
     let ratio = (sum / f64::from(count)).exp();
-    let best = (instrument.axes.move_s * ratio / row_s).sqrt().round();
+    let best = (move_s * ratio / row_s).sqrt().round();
     let rows_per_stop = best.clamp(1.0, f64::from(block)) as u32;
-    Share { weight: 0.0, row_s: row_s + instrument.axes.move_s / f64::from(rows_per_stop), rows_per_stop }
+    Share { weight: 0.0, row_s: row_s + move_s / f64::from(rows_per_stop), rows_per_stop }
 }
 
 /// The candidates that are worth a stop, `most` at most, and their best weights among themselves: the lesser half is dropped and the rest weighed

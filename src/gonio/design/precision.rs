@@ -55,7 +55,7 @@ pub fn precision(prior: &Prior, instrument: &Instrument, directions: &Directions
             .map_or(f64::NEG_INFINITY, |c| 2.0 * c.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>())
     };
     Precision {
-        hours: hours(instrument, rows),
+        hours: hours(instrument, directions, rows),
         stops: stops.len(),
         rows: rows.len(),
         errors: (0..model.parameters()).map(quantiles).collect(),

@@ -1,8 +1,10 @@
 //! Shares of the time to whole readings that a budget pays for, moves and visits included, in an order that keeps moves few.
 
 use super::prior::Wrong;
-use crate::gonio::cost::{seconds, visit_s};
+use crate::gonio::cost::{seconds_of, visit_s};
 use crate::gonio::instrument::Instrument;
+use crate::gonio::travel::Moves;
+use crate::measurement::Directions;
 
 /// A candidate that is read.
 #[derive(Debug, Clone, Copy)]
@@ -18,13 +20,20 @@ pub(super) struct Share {
 /// Most rows a plan may have.
 const MOST_ROWS: f64 = 1e6;
 
-/// Rows (indices of `shares`, in the order in which they are read) that take no longer than `budget_s`. Each share is multiplied by the same number
+/// Rows (indices of `shares` and their `directions`, in the order in which they are read) that take no longer than `budget_s`. Each share is multiplied by the same number
 /// and rounded up, as efficient rounding asks (Pukelsheim & Rieder 1992): the number is the largest that the budget pays for.
 ///
 /// # Errors
 /// [`Wrong::Budget`] where it does not pay for one row each, [`Wrong::TooMany`].
-pub(super) fn rows(shares: &[Share], instrument: &Instrument, budget_s: f64) -> Result<Vec<u32>, Wrong> {
-    let least_s = seconds(instrument, &in_order(shares, 0.0));
+pub(super) fn rows(
+    shares: &[Share],
+    directions: &Directions,
+    instrument: &Instrument,
+    budget_s: f64,
+) -> Result<Vec<u32>, Wrong> {
+    let moves = Moves::new(instrument, directions);
+    let seconds = |rows: &[u32]| seconds_of(instrument, &moves, rows);
+    let least_s = seconds(&in_order(shares, 0.0));
     if least_s > budget_s {
         // Up to the next ms, so that the time that is asked for is enough.
         let least_s = (1e3 * least_s).ceil() / 1e3;
@@ -39,7 +48,7 @@ pub(super) fn rows(shares: &[Share], instrument: &Instrument, budget_s: f64) -> 
     let (mut low, mut high) = (0.0, 2.0 * budget_s);
     while high - low > 1e-6 * budget_s {
         let middle = 0.5 * (low + high);
-        let fits = seconds(instrument, &in_order(shares, middle)) <= budget_s;
+        let fits = seconds(&in_order(shares, middle)) <= budget_s;
         if fits { low = middle } else { high = middle }
     }
     Ok(in_order(shares, low))
@@ -82,23 +91,37 @@ fn alternating(left: &[u32]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::angles::direction_deg;
     use crate::gonio::parts::Axes;
+    use crate::gonio::seconds;
 
     fn shares(rows_per_stop: u32) -> Vec<Share> {
         [0.4, 0.35, 0.25].map(|weight| Share { weight, row_s: 1.0, rows_per_stop }).to_vec()
     }
 
+    fn directions() -> Directions {
+        let wo = [0.0, 20.0, 40.0].map(|theta| direction_deg(theta, 0.0)).to_vec();
+        Directions::List { wi: vec![direction_deg(30.0, 180.0); 3], wo }
+    }
+
+    fn moving(degrees_per_s: f64) -> Instrument {
+        Instrument { axes: Axes { move_s: 7.0, degrees_per_s, ..Axes::default() }, ..Instrument::default() }
+    }
+
     #[test]
     fn the_budget_is_kept_and_used_but_for_one_round_of_rows() {
-        let instrument = Instrument { axes: Axes { move_s: 7.0, ..Axes::default() }, ..Instrument::default() };
-        for (budget, rows_per_stop) in [(25.0, 500), (100.0, 500), (1000.0, 500), (1000.0, 20)] {
-            let rows = rows(&shares(rows_per_stop), &instrument, budget).expect("enough");
-            let used = seconds(&instrument, &rows);
-            assert!(used <= budget && used > budget - 3.0 * (1.0 + 7.0), "{budget}: {used}");
+        for (budget, rows_per_stop, degrees_per_s) in
+            [(25.0, 500, 0.0), (100.0, 500, 0.0), (1000.0, 500, 0.0), (1000.0, 20, 0.0), (1000.0, 20, 5.0)]
+        {
+            let instrument = moving(degrees_per_s);
+            let rows = rows(&shares(rows_per_stop), &directions(), &instrument, budget).expect("enough");
+            let used = seconds(&instrument, &directions(), &rows);
+            let longest_move = if degrees_per_s > 0.0 { 7.0 + 40.0 / degrees_per_s } else { 7.0 };
+            assert!(used <= budget && used > budget - 3.0 * (1.0 + longest_move), "{budget}: {used}");
             let longest = rows.chunk_by(|a, b| a == b).map(<[u32]>::len).max().unwrap_or(0);
             assert!(longest <= rows_per_stop as usize);
         }
-        let many = rows(&shares(500), &instrument, 1e3).expect("enough");
+        let many = rows(&shares(500), &directions(), &moving(0.0), 1e3).expect("enough");
         let count = |x: u32| many.iter().filter(|r| **r == x).count() as f64 / many.len() as f64;
         assert!((count(0) - 0.4).abs() < 0.01 && (count(2) - 0.25).abs() < 0.01);
     }
@@ -113,10 +136,10 @@ mod tests {
 
     #[test]
     fn too_little_says_the_least_that_is_needed() {
-        let instrument = Instrument { axes: Axes { move_s: 7.0, ..Axes::default() }, ..Instrument::default() };
-        let error = rows(&shares(500), &instrument, 23.0).expect_err("too little").to_string();
+        let (instrument, directions) = (moving(0.0), directions());
+        let error = rows(&shares(500), &directions, &instrument, 23.0).expect_err("too little").to_string();
         assert!(error.contains("24") && error.contains("23"), "{error}");
-        assert!(rows(&shares(500), &instrument, 24.0).expect("just enough").len() == 3);
-        assert!(matches!(rows(&shares(500), &instrument, 1e8), Err(Wrong::TooMany { .. })));
+        assert!(rows(&shares(500), &directions, &instrument, 24.0).expect("just enough").len() == 3);
+        assert!(matches!(rows(&shares(500), &directions, &instrument, 1e8), Err(Wrong::TooMany { .. })));
     }
 }
