@@ -13,6 +13,8 @@ use crate::measurement::{Dimension, Measurement};
 const MODEL: &str = "lambert+phong+phong";
 /// Share by which source and aperture may lower a lobe's peak before its slopes are not those of a lobe any more.
 const SMEARED: f64 = 0.05;
+/// How much larger the residual of a fit that conserves energy may be.
+const AS_GOOD: f64 = 1.5;
 /// Share of a lobe's width from which on it counts that errors of positions move it.
 const STANDS_OFF: f64 = 0.2;
 
@@ -36,14 +38,15 @@ impl Surrogate {
     /// A plain fit, unless source and aperture smear a lobe that stands out.
     fn fitted(readings: &Measurement, instrument: &Instrument) -> Option<Self> {
         let options = FitOptions::new(MODEL.parse().ok()?);
-        let plain = fit(readings, &options).ok()?.material;
+        let plain = within_reason(readings, &options)?;
         let cones = || Cones::of(instrument).filter(|_| readings.dimension == Dimension::Space);
         if let Some(cones) = cones().filter(|_| is_smeared(&plain, instrument)) {
             let cones = std::sync::Arc::new(cones);
             let seen = FitOptions { through: Some(cones.clone()), ..options };
-            if let Ok(fitted) = fit(readings, &seen) {
-                drop(seen);
-                return Some(Self { material: fitted.material, cones: std::sync::Arc::into_inner(cones) });
+            let fitted = within_reason(readings, &seen);
+            drop(seen);
+            if let Some(material) = fitted {
+                return Some(Self { material, cones: std::sync::Arc::into_inner(cones) });
             }
         }
         Some(Self { material: plain, cones: None })
@@ -56,6 +59,17 @@ impl Surrogate {
             None => self.material.write_value(wi, wo, out),
         }
     }
+}
+
+/// A fit. One that reflects more light than arrives, as a peak does of which saturated readings left the foot alone, is held to what arrives if that
+/// describes the readings nearly as well: in the others, their unit may be another.
+fn within_reason(readings: &Measurement, options: &FitOptions) -> Option<Material> {
+    let free = fit(readings, options).ok()?.material;
+    let facts = |of: &Material| of.fit.as_ref().and_then(|f| Some((f.rmse, f.energy.as_ref()?.largest)));
+    let Some((rmse, _)) = facts(&free).filter(|(_, largest)| *largest > 1.0) else { return Some(free) };
+    let held = fit(readings, &FitOptions { conserve_energy: true, ..options.clone() }).ok();
+    let held = held.map(|f| f.material).filter(|m| facts(m).is_some_and(|(held, _)| held <= AS_GOOD * rmse));
+    Some(held.unwrap_or(free))
 }
 
 /// Sum of the squares of both cones' half angles.

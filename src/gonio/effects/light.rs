@@ -103,13 +103,19 @@ struct Spread<'a> {
 impl Pass for Spread<'_> {
     fn apply(&self, block: &mut Block<'_>) {
         let (mut f, mut out) = (vec![0.0; block.width], vec![0.0; block.width]);
+        let mut last = None;
         for (i, reading) in block.readings.iter().enumerate() {
             let (gain, light) = (self.light.gain, &self.light);
             let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
                 light.add(reading.kind, (wi, wo), gain * weight, &mut f, out);
             };
-            let error = self.cones.mean(block.wi[i], block.wo[i], &mut add, &mut out);
-            block.error = block.error.max(error);
+            // Repeats and exposures of one stop have the same mean.
+            let here = Some((reading.kind, block.wi[i], block.wo[i]));
+            if here != last {
+                let error = self.cones.mean(block.wi[i], block.wo[i], &mut add, &mut out);
+                block.error = block.error.max(error);
+                last = here;
+            }
             block.of(i).iter_mut().zip(&out).for_each(|(s, out)| *s *= out);
         }
     }

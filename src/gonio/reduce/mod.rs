@@ -31,7 +31,7 @@ use super::simulate::Truth;
 use crate::measurement::{Dimension, Masked, Measurement};
 
 /// Why raw readings can't be reduced.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReduceError {
     /// No reading of the sample.
@@ -45,6 +45,28 @@ pub enum ReduceError {
     /// Readings of the reference without its certificate.
     #[error("the reference was read, but its reflectance is not stated (instrument.reference.reflectance)")]
     NoCertificate,
+    /// Of one channel no reading of the reference can be used.
+    #[error(
+        "channel {channel}: every reading of the reference is saturated or missing; expected one below the full well at least (shorter exposures?)"
+    )]
+    UnreadableReference {
+        /// The channel.
+        channel: String,
+    },
+    /// The reference is no brighter than what is read without it.
+    #[error(
+        "channel {channel}: the reference reads {rate} a second at {time_s} s, expected more than the blank's or dark's {base} a second"
+    )]
+    DarkReference {
+        /// The channel.
+        channel: String,
+        /// When, s.
+        time_s: f64,
+        /// Signal a second.
+        rate: f64,
+        /// Signal a second of blank or dark at that time.
+        base: f64,
+    },
 }
 
 /// Readings, reduced.
@@ -76,7 +98,7 @@ pub fn reduce(
     if has_reference != instrument.has_reference() {
         return Err(if has_reference { ReduceError::NoCertificate } else { ReduceError::NoScale });
     }
-    let visits = Visits::new(&stops, raw, instrument);
+    let visits = Visits::new(&stops, raw, instrument)?;
     Ok(Work { raw, instrument, scale: Scale::new(instrument, raw.dimension), visits }.run(name, &stops, model))
 }
 

@@ -5,7 +5,7 @@
 //! of the variance is common and the rest counts as each reading's own, which keeps the variance of a reading and of the mean over the group.
 
 use super::budget::{Budget, Type};
-use super::visits::Visits;
+use super::visits::{Gap, Visits};
 use super::{Reduced, Table};
 use crate::gonio::instrument::Instrument;
 
@@ -45,7 +45,7 @@ pub(super) struct Shared<'a> {
     places: std::collections::HashMap<(usize, usize, usize), usize>,
     /// Visits that are one component.
     group: usize,
-    has_visits: [bool; 2],
+    has_reference: bool,
 }
 
 /// Families in the order of the budget.
@@ -90,7 +90,7 @@ impl<'a> Shared<'a> {
             components: Vec::new(),
             places: std::collections::HashMap::new(),
             group: visits.len().div_ceil(afforded).max(1),
-            has_visits: visits.has,
+            has_reference: visits.has[1],
         }
     }
 
@@ -140,29 +140,26 @@ impl<'a> Shared<'a> {
 
     /// Adds all that one reduced reading has of errors that do not depend on positions.
     pub fn reading(&mut self, place: usize, channel: usize, of: &Reduced) {
-        let Reduced { value, conversion, rate, at, .. } = *of;
+        let Reduced { value, conversion, rate, ref at, .. } = *of;
         self.add_own(READING, place, conversion * conversion * rate.variance);
-        let [has_base, has_reference] = self.has_visits;
-        for (k, (visit, share)) in at.visits.into_iter().enumerate() {
-            if has_reference {
-                let u = -value / at.reference * share * at.reference_sigma[k];
-                self.add_grouped(REFERENCE, visit, channel, place, u);
-            }
-            if has_base {
-                let through_reference = if has_reference { value / at.reference } else { 0.0 };
-                let u = (through_reference - conversion) * share * at.base_sigma[k];
-                self.add_grouped(BASE, visit, channel, place, u);
-            }
+        for part in &at.reference_parts {
+            let u = -value / at.reference * part.share * part.sigma;
+            self.add_grouped(REFERENCE, part.number, channel, place, u);
+        }
+        for part in &at.base_parts {
+            let u = (value / at.reference * part.through_reference - conversion * part.direct) * part.sigma;
+            self.add_grouped(BASE, part.number, channel, place, u);
         }
         self.add(CERTIFICATE, (0, 0), place, value * self.instrument.reference.reflectance_u);
         let drift = self.instrument.source.drift_per_sqrt_hour;
+        let has_reference = self.has_reference;
         if has_reference {
-            self.bridge(DRIFT, place, of, value * drift);
+            self.bridge(DRIFT, place, &at.reference_gap, value * drift);
         } else {
             // Nothing tells how far the power has walked since the start.
             self.add(DRIFT, (0, 0), place, value * drift * (of.time_s / 3600.0).sqrt());
         }
-        self.bridge(DARK, place, of, conversion * self.instrument.detector.dark_drift_per_sqrt_hour);
+        self.bridge(DARK, place, &at.base_gap, conversion * self.instrument.detector.dark_drift_per_sqrt_hour);
         let detector = &self.instrument.detector;
         if detector.nonlinearity_u > 0.0 {
             let of_reference = if has_reference { value * at.reference_signal } else { 0.0 };
@@ -171,10 +168,12 @@ impl<'a> Shared<'a> {
         }
     }
 
-    /// A walk of σ `per_sqrt_hour` that two visits know the ends of: a Brownian bridge, √2 Σ sin(mπτ)/(mπ) times normal numbers and √span.
-    fn bridge(&mut self, family: usize, place: usize, of: &Reduced, per_sqrt_hour: f64) {
-        let sigma = per_sqrt_hour * (of.at.span_s / 3600.0).sqrt();
-        let (interval, late) = (of.at.visits[0].0, of.at.visits[1].1);
+    /// A walk of σ `per_sqrt_hour` that two visits know the ends of: a Brownian bridge, √2 Σ sin(mπτ)/(mπ) times normal numbers and √span. Before the
+    /// first and after the last visit it walks on.
+    fn bridge(&mut self, family: usize, place: usize, gap: &Gap, per_sqrt_hour: f64) {
+        self.add(family, (usize::MAX, gap.number), place, per_sqrt_hour * (gap.beyond_s / 3600.0).sqrt());
+        let sigma = per_sqrt_hour * (gap.span_s / 3600.0).sqrt();
+        let (interval, late) = (gap.number, gap.late);
         let mut left = late * (1.0 - late);
         for mode in 1..=MODES {
             let at = std::f64::consts::PI * mode as f64;

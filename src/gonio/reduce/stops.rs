@@ -51,10 +51,13 @@ fn combined(raw: &Raw, instrument: &Instrument, first: usize, run: &[Reading]) -
         let mut begin = first;
         let mut best: Option<(f64, Rate)> = None;
         for list in exposures {
-            let signals: Vec<f64> = (begin..begin + list.len()).map(|i| raw.signals(i)[c]).collect();
+            // A repeat that was not read counts for nothing.
+            let all = (begin..begin + list.len()).map(|i| raw.signals(i)[c]);
+            let signals: Vec<f64> = all.filter(|s| !s.is_nan()).collect();
             begin += list.len();
             let exposure = list[0].exposure_s;
-            if signals.iter().all(|s| *s < limit(instrument)) && best.is_none_or(|(longest, _)| exposure > longest) {
+            let usable = !signals.is_empty() && signals.iter().all(|s| *s < limit(instrument));
+            if usable && best.is_none_or(|(longest, _)| exposure > longest) {
                 best = Some((exposure, rate(&signals, exposure, instrument)));
             }
         }

@@ -1,113 +1,296 @@
-//! Visits to the reference, the blank and the dark, and what they say of the time between them.
+//! Readings of the reference, the blank and the dark, and what they say of the time between them.
+//!
+//! Each kind has its own times: a blank may be read more often than the reference, and where one can't be used the next one counts.
 
+use super::ReduceError;
 use super::positions;
 use super::stops::Stop;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::reading::Kind;
 
-/// What was read at one visit, channel by channel.
-#[derive(Debug, Clone)]
-struct Visit {
-    time_s: f64,
-    /// Rate without the sample's light, and its variance.
-    base: Vec<(f64, f64)>,
-    /// The reference's net rate and the variance of its own reading.
-    reference: Vec<(f64, f64)>,
-    /// Signal of one reading of the reference.
-    signal: Vec<f64>,
-}
-
-/// All visits, in order of time.
-pub(super) struct Visits {
-    visits: Vec<Visit>,
-    /// Whether there is a base, and a reference.
-    pub has: [bool; 2],
-}
-
-/// What the visits say of one moment and channel.
+/// What was read once, of one channel.
 #[derive(Debug, Clone, Copy)]
+struct Point {
+    time_s: f64,
+    /// Rate and its variance.
+    mean: f64,
+    variance: f64,
+    /// Signal of one reading.
+    signal: f64,
+    /// Number of the stop among those of its kind.
+    number: usize,
+}
+
+/// The readings of one kind around a moment.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Gap {
+    /// Number of the one before.
+    pub number: usize,
+    /// Where the moment lies between both, 0 to 1.
+    pub late: f64,
+    /// Seconds between both.
+    pub span_s: f64,
+    /// Seconds from the nearest where there is none on the other side.
+    pub beyond_s: f64,
+}
+
+/// A reading of blank or dark in a reading of the sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BasePart {
+    /// Its number.
+    pub number: usize,
+    /// What the base at that moment has of it, and what the reference's net rate lost by it.
+    pub direct: f64,
+    pub through_reference: f64,
+    /// σ of its rate.
+    pub sigma: f64,
+}
+
+/// A reading of the reference in a reading of the sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ReferencePart {
+    /// Its number.
+    pub number: usize,
+    /// Its share.
+    pub share: f64,
+    /// σ of its rate.
+    pub sigma: f64,
+}
+
+/// What is known of one moment and channel.
+#[derive(Debug, Clone)]
 pub(super) struct At {
     /// Rate without the sample's light.
     pub base: f64,
     /// The reference's net rate; 1 where there is none.
     pub reference: f64,
-    /// The visit before and the one after, and the share of each.
-    pub visits: [(usize, f64); 2],
-    /// σ of the base at those visits.
-    pub base_sigma: [f64; 2],
-    /// σ of the reference's reading at those visits.
-    pub reference_sigma: [f64; 2],
+    /// What both are made from.
+    pub base_parts: Vec<BasePart>,
+    pub reference_parts: Vec<ReferencePart>,
     /// Signal of one reading of the reference.
     pub reference_signal: f64,
-    /// Seconds between those visits.
-    pub span_s: f64,
+    /// Where the moment lies between readings of the base, and of the reference.
+    pub base_gap: Gap,
+    pub reference_gap: Gap,
+}
+
+/// All readings of base and reference, in order of time, channel by channel.
+pub(super) struct Visits {
+    base: Vec<Vec<Point>>,
+    reference: Vec<Vec<Point>>,
+    /// Stops of the kind that has more.
+    count: usize,
+    /// Whether there is a base, and a reference.
+    pub has: [bool; 2],
 }
 
 impl Visits {
-    pub fn new(stops: &[Stop], raw: &Raw, instrument: &Instrument) -> Self {
-        let (width, jitter) = (raw.channels.len(), positions::of_reference(instrument, raw.dimension));
-        let runs = stops.chunk_by(|a, b| (a.kind == Kind::Sample) == (b.kind == Kind::Sample));
-        let visits: Vec<Visit> =
-            runs.filter(|run| run[0].kind != Kind::Sample).map(|run| Visit::new(run, width, jitter)).collect();
-        let any = |kinds: &[Kind]| stops.iter().any(|s| kinds.contains(&s.kind));
-        let has = [any(&[Kind::Blank, Kind::Dark]), any(&[Kind::Reference])];
-        Self { visits, has }
+    /// From all stops.
+    ///
+    /// # Errors
+    /// [`ReduceError`] where no reading of the reference can be used, or one is no brighter than the blank.
+    pub fn new(stops: &[Stop], raw: &Raw, instrument: &Instrument) -> Result<Self, ReduceError> {
+        let width = raw.channels.len();
+        let points = |kind: Kind, c: usize| -> Vec<Point> {
+            let of_kind = stops.iter().filter(|s| s.kind == kind).enumerate();
+            of_kind
+                .filter_map(|(number, stop)| {
+                    let rate = stop.rates[c]?;
+                    let (mean, variance, signal) = (rate.mean, rate.variance, rate.signal);
+                    Some(Point { time_s: stop.time_s, mean, variance, signal, number })
+                })
+                .collect()
+        };
+        // The blank where there is one, else the dark.
+        let base =
+            |c: usize| Some(points(Kind::Blank, c)).filter(|b| !b.is_empty()).unwrap_or_else(|| points(Kind::Dark, c));
+        let count = |kind: Kind| stops.iter().filter(|s| s.kind == kind).count();
+        let counts = [Kind::Blank, Kind::Dark, Kind::Reference].map(count);
+        let mut visits = Self {
+            base: (0..width).map(base).collect(),
+            reference: (0..width).map(|c| points(Kind::Reference, c)).collect(),
+            count: counts.into_iter().max().unwrap_or(0),
+            has: [counts[0] + counts[1] > 0, counts[2] > 0],
+        };
+        visits.check(raw)?;
+        let jitter = positions::of_reference(instrument, raw.dimension);
+        for (c, list) in visits.reference.iter_mut().enumerate() {
+            for point in list {
+                let net = point.mean - interpolated(&visits.base[c], point.time_s).0;
+                point.variance += (jitter * net).powi(2);
+            }
+        }
+        Ok(visits)
     }
 
-    /// How many there are.
+    fn check(&self, raw: &Raw) -> Result<(), ReduceError> {
+        if !self.has[1] {
+            return Ok(());
+        }
+        for (c, channel) in raw.channels.iter().enumerate() {
+            if self.reference[c].is_empty() {
+                return Err(ReduceError::UnreadableReference { channel: channel.clone() });
+            }
+            for point in &self.reference[c] {
+                let base = interpolated(&self.base[c], point.time_s).0;
+                if point.mean <= base {
+                    let (channel, time_s) = (channel.clone(), point.time_s);
+                    return Err(ReduceError::DarkReference { channel, time_s, rate: point.mean, base });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// How many there are of the kind that was read most often.
     pub fn len(&self) -> usize {
-        self.visits.len()
+        self.count
     }
 
     /// What they say of `time_s`: linear between two, the nearest before the first and after the last.
     pub fn at(&self, time_s: f64, channel: usize) -> At {
-        if self.visits.is_empty() {
-            let none = [(0, 0.0); 2];
-            let (base_sigma, reference_sigma) = ([0.0; 2], [0.0; 2]);
-            return At {
-                base: 0.0,
-                reference: 1.0,
-                visits: none,
-                base_sigma,
-                reference_sigma,
-                reference_signal: 0.0,
-                span_s: 0.0,
-            };
+        let (base_list, reference_list) = (&self.base[channel], &self.reference[channel]);
+        let (base, around, base_gap) = interpolated(base_list, time_s);
+        let mut base_parts = Vec::with_capacity(4);
+        for (i, share) in around {
+            add_part(&mut base_parts, base_list, i, (share, 0.0));
         }
-        let after = self.visits.partition_point(|v| v.time_s < time_s);
-        let (a, b) = (after.saturating_sub(1), after.min(self.visits.len() - 1));
-        let (before, next) = (&self.visits[a], &self.visits[b]);
-        let span_s = next.time_s - before.time_s;
-        let late = if span_s > 0.0 { (time_s - before.time_s) / span_s } else { 0.0 };
-        let mix = |of: fn(&Visit) -> &Vec<(f64, f64)>| {
-            let (x, y) = (of(before)[channel], of(next)[channel]);
-            ((1.0 - late) * x.0 + late * y.0, [x.1.sqrt(), y.1.sqrt()])
-        };
-        let (base, base_sigma) = mix(|v| &v.base);
-        let (reference, reference_sigma) = mix(|v| &v.reference);
-        let reference_signal = before.signal[channel];
-        let visits = [(a, 1.0 - late), (b, late)];
-        At { base, reference, visits, base_sigma, reference_sigma, reference_signal, span_s }
+        let (mut reference, mut reference_parts) = (0.0, Vec::with_capacity(2));
+        let (_, around, reference_gap) = interpolated(reference_list, time_s);
+        for (i, share) in around {
+            let point = reference_list[i];
+            let (under, of_base, _) = interpolated(base_list, point.time_s);
+            reference += share * (point.mean - under);
+            reference_parts.push(ReferencePart { number: point.number, share, sigma: point.variance.sqrt() });
+            for (k, part) in of_base {
+                add_part(&mut base_parts, base_list, k, (0.0, share * part));
+            }
+        }
+        let reference_signal = around.into_iter().next().map_or(0.0, |(i, _)| reference_list[i].signal);
+        if reference_list.is_empty() {
+            reference = 1.0;
+        }
+        At { base, reference, base_parts, reference_parts, reference_signal, base_gap, reference_gap }
     }
 }
 
-impl Visit {
-    /// From the stops of one visit; `jitter` is the relative σ of where the axes stop at the reference.
-    fn new(run: &[Stop], width: usize, jitter: f64) -> Self {
-        let of = |kind: Kind| run.iter().rfind(|s| s.kind == kind);
-        let rate = |kind: Kind, c: usize| of(kind).and_then(|s| s.rates[c]);
-        let base: Vec<(f64, f64)> = (0..width)
-            .map(|c| rate(Kind::Blank, c).or(rate(Kind::Dark, c)).map_or((0.0, 0.0), |r| (r.mean, r.variance)))
-            .collect();
-        let reference = |(c, base): (usize, &(f64, f64))| match (of(Kind::Reference), rate(Kind::Reference, c)) {
-            (_, Some(r)) => (r.mean - base.0, r.variance + (jitter * (r.mean - base.0)).powi(2)),
-            (Some(_), None) => (f64::NAN, f64::NAN), // saturated
-            (None, None) => (1.0, 0.0),
-        };
-        let reference = base.iter().enumerate().map(reference).collect();
-        let signal = (0..width).map(|c| rate(Kind::Reference, c).map_or(0.0, |r| r.signal)).collect();
-        let time_s = run.iter().map(|s| s.time_s).sum::<f64>() / run.len() as f64;
-        Self { time_s, base, reference, signal }
+/// Value at a moment, the places in the list of what it is made from with their shares, and where it lies; nothing of an empty list.
+fn interpolated(list: &[Point], time_s: f64) -> (f64, Around, Gap) {
+    let after = list.partition_point(|p| p.time_s < time_s);
+    let (Some(last), before) = (list.len().checked_sub(1), after.saturating_sub(1)) else {
+        return (0.0, Around::default(), Gap::default());
+    };
+    let (a, b) = (before, after.min(last));
+    let span_s = list[b].time_s - list[a].time_s;
+    let late = if span_s > 0.0 { (time_s - list[a].time_s) / span_s } else { 0.0 };
+    let beyond_s = if a == b { (time_s - list[a].time_s).abs() } else { 0.0 };
+    let value = (1.0 - late) * list[a].mean + late * list[b].mean;
+    let around = Around(if a == b { [Some((a, 1.0)), None] } else { [Some((a, 1.0 - late)), Some((b, late))] });
+    (value, around, Gap { number: list[a].number, late, span_s, beyond_s })
+}
+
+/// Places in a list with their shares: none, one or two.
+#[derive(Debug, Clone, Copy, Default)]
+struct Around([Option<(usize, f64)>; 2]);
+
+impl IntoIterator for Around {
+    type Item = (usize, f64);
+    type IntoIter = std::iter::Flatten<std::array::IntoIter<Option<(usize, f64)>, 2>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter().flatten()
+    }
+}
+
+/// Adds what a moment has of a reading of the base, directly and through the reference.
+fn add_part(parts: &mut Vec<BasePart>, list: &[Point], i: usize, (direct, through_reference): (f64, f64)) {
+    let Point { number, variance, .. } = list[i];
+    match parts.iter_mut().find(|part| part.number == number) {
+        Some(part) => {
+            part.direct += direct;
+            part.through_reference += through_reference;
+        }
+        None => parts.push(BasePart { number, direct, through_reference, sigma: variance.sqrt() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gonio::reduce::stops::Rate;
+    use crate::measurement::{Dimension, Directions, Weights};
+
+    fn raw() -> Raw {
+        Raw {
+            channels: vec!["y".into()],
+            dimension: Dimension::Space,
+            directions: Directions::List { wi: vec![], wo: vec![] },
+            weights: Weights::Uniform,
+            readings: vec![],
+            signal: vec![],
+            quadrature_error: 0.0,
+        }
+    }
+
+    fn stop(kind: Kind, time_s: f64, mean: f64) -> Stop {
+        Stop {
+            kind,
+            entry: None,
+            time_s,
+            rates: vec![(!mean.is_nan()).then_some(Rate { mean, variance: 1.0, signal: mean })],
+        }
+    }
+
+    fn visits(list: &[(Kind, f64, f64)]) -> Result<Visits, ReduceError> {
+        let stops: Vec<Stop> = list.iter().map(|(kind, time, mean)| stop(*kind, *time, *mean)).collect();
+        Visits::new(&stops, &raw(), &Instrument::default())
+    }
+
+    /// Whichever kind was read when: constant rates give the same net rate everywhere.
+    #[test]
+    fn every_kind_has_its_own_times() {
+        use Kind::{Blank, Reference};
+        for list in [
+            vec![(Reference, 0.0, 1000.0), (Blank, 2.0, 10.0), (Blank, 12.0, 10.0)],
+            vec![(Blank, 0.0, 10.0), (Reference, 10.0, 1000.0), (Blank, 12.0, 10.0)],
+            vec![(Blank, 0.0, 10.0), (Reference, 10.0, 1000.0)],
+            vec![
+                (Reference, 0.0, 1000.0),
+                (Blank, 1.0, 10.0),
+                (Blank, 5.5, 10.0),
+                (Reference, 9.0, 1000.0),
+                (Blank, 10.0, 10.0),
+            ],
+            vec![(Reference, 0.0, 1000.0), (Reference, 9.0, f64::NAN), (Blank, 1.0, 10.0), (Blank, 10.0, f64::NAN)],
+        ] {
+            let at = visits(&list).expect("readable").at(5.0, 0);
+            assert!((at.base - 10.0).abs() < 1e-12 && (at.reference - 990.0).abs() < 1e-12, "{list:?}: {at:?}");
+            let shares: f64 = at.base_parts.iter().map(|p| p.direct).sum();
+            let through: f64 = at.base_parts.iter().map(|p| p.through_reference).sum();
+            let reference: f64 = at.reference_parts.iter().map(|p| p.share).sum();
+            assert!([shares, through, reference].iter().all(|s| (s - 1.0).abs() < 1e-12), "{list:?}: {at:?}");
+        }
+    }
+
+    /// Drifting rates are followed in each one's own time.
+    #[test]
+    fn each_kind_is_interpolated_at_its_own_times() {
+        use Kind::{Blank, Reference};
+        let list = [(Reference, 0.0, 1000.0), (Blank, 2.0, 10.0), (Reference, 10.0, 1020.0), (Blank, 12.0, 12.0)];
+        let at = visits(&list).expect("readable").at(5.0, 0);
+        // The blank at 5 s is 10.6; under the reference it was 10 (the nearest) and 11.6.
+        assert!((at.base - 10.6).abs() < 1e-12 && (at.reference - (1010.0 - 10.8)).abs() < 1e-12, "{at:?}");
+    }
+
+    #[test]
+    fn a_reference_that_says_nothing_is_refused_with_the_place() {
+        use Kind::{Blank, Reference};
+        let dark = visits(&[(Reference, 3.0, 10.0), (Blank, 0.0, 10.0)]).err().expect("refused");
+        assert!(dark.to_string().contains("channel y: the reference reads 10 a second at 3 s"), "{dark}");
+        let none = visits(&[(Reference, 3.0, f64::NAN), (Blank, 0.0, 10.0)]).err().expect("refused");
+        assert!(none.to_string().contains("every reading of the reference is saturated or missing"), "{none}");
+        let at = visits(&[]).expect("nothing to refuse").at(1.0, 0);
+        assert!(at.base == 0.0 && at.reference == 1.0 && at.base_parts.is_empty());
     }
 }
