@@ -216,6 +216,13 @@ impl Reflectance {
         Self::new(diffuse, phong.into_iter().map(|(weight, exponent)| GlossyTerm { weight, exponent }).collect())
     }
 
+    /// The Lambert lobe's weights and the probability of drawing from it; of each Phong lobe weights, exponent and probability.
+    #[allow(clippy::type_complexity)] // two lobes' parts
+    pub fn parts(&self) -> (&[f64], f64, impl Iterator<Item = (&[f64], f64, f64)>) {
+        let glossy = self.glossy.iter().zip(&self.share[1..]);
+        (&self.diffuse, self.share[0], glossy.map(|(term, share)| (&term.weight[..], term.exponent, *share)))
+    }
+
     /// Directional albedo of each channel for light to or from `w`.
     #[must_use]
     pub fn directional_albedo(&self, w: DVec3) -> Vec<f64> {
@@ -232,6 +239,10 @@ impl Reflectance {
 impl Brdf for Reflectance {
     fn channels(&self) -> usize {
         self.diffuse.len()
+    }
+
+    fn lobes(&self) -> Option<&Reflectance> {
+        Some(self)
     }
 
     fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool {

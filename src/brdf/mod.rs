@@ -38,6 +38,11 @@ pub trait Brdf: Send + Sync {
     /// `wo` is: such a draw counts as one that carries nothing.
     fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<Sample>;
 
+    /// The sum of lobes that it is, if it is one.
+    fn lobes(&self) -> Option<&Reflectance> {
+        None
+    }
+
     /// Density (1/sr) with which [`Brdf::sample`] draws `wi` given `wo`. It integrates to at most 1 over the upper
     /// hemisphere, the rest being the draws that return `None`.
     fn pdf(&self, wi: DVec3, wo: DVec3) -> f64;

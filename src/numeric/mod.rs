@@ -4,6 +4,7 @@
 //! partial results are added in order, so results do not depend on the number of threads.
 
 pub mod float;
+pub mod lanes;
 pub mod quadrature;
 pub mod random;
 pub mod simd;

@@ -53,8 +53,8 @@ pub fn vectorised<K: Kernel>(kernel: K) -> K::Output {
 #[must_use]
 #[derive(Debug, Clone, Copy)]
 pub struct Lanes<S: Simd> {
-    simd: S,
-    v: S::f64s,
+    pub(super) simd: S,
+    pub(super) v: S::f64s,
 }
 
 /// A number for each lane.

@@ -8,11 +8,11 @@ use super::scene::CameraSpec;
 /// A pinhole camera for one picture size.
 #[derive(Debug, Clone, Copy)]
 pub struct Camera {
-    position: DVec3,
-    forward: DVec3,
-    across: DVec3,
-    down: DVec3,
-    pixel: DVec2,
+    pub position: DVec3,
+    pub forward: DVec3,
+    pub across: DVec3,
+    pub down: DVec3,
+    pub pixel: DVec2,
 }
 
 impl Camera {

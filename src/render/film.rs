@@ -8,11 +8,13 @@ use rayon::prelude::*;
 use super::RenderError;
 use super::camera::Camera;
 use super::integrator::{PathResult, Strategy, Tracer};
+use super::packet::{FlatScene, Found, Packets, Plan};
 use super::scene::{Scene, SceneSpec};
 use crate::control::Control;
 use crate::image::{Image, Metadata};
 use crate::numeric::float::sqrt_nonneg;
 use crate::numeric::random::{Purpose, RngExt, Stream, stream};
+use crate::numeric::simd::LANES;
 
 /// Samples of a pixel in one pass at most.
 const PASS: u32 = 32;
@@ -212,16 +214,22 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     };
     let camera = Camera::new(&scene.camera, scene.origin, options.width, options.height);
     let tracer = Tracer::new(scene, options.strategy);
+    let flat = FlatScene::of(scene).filter(|_| options.strategy == Strategy::Combined);
+    let packets = flat.as_ref().map(|scene| Packets { scene, plan: Plan::of(scene), camera, seed: options.seed });
     control.progress.start("render", u64::from(options.samples) * u64::from(options.height));
     let mut done = 0;
     while done < options.samples && !control.stop.requested() {
-        let pass = done.clamp(1, PASS).min(options.samples - done);
+        let least = if packets.is_some() { LANES as u32 } else { 1 };
+        let pass = done.clamp(least, PASS).min(options.samples - done);
         let rows = film.pixels.par_chunks_mut(width).enumerate();
         let bad = rows.map(|(y, row)| {
             if control.stop.requested() {
                 return 0;
             }
-            let bad = render_row(&tracer, &camera, y, row, pass);
+            let bad = match &packets {
+                Some(packets) => packet_row(packets, y, row, (done, pass)),
+                None => render_row(&tracer, &camera, y, row, pass),
+            };
             control.progress.advance(u64::from(pass));
             bad
         });
@@ -257,6 +265,23 @@ fn render_row(tracer: &Tracer<'_>, camera: &Camera, y: usize, row: &mut [Pixel],
             pixel.add(&path);
         }
     }
+    bad
+}
+
+/// The same by packets: those of the last that are too many don't count.
+fn packet_row(packets: &Packets<'_>, y: usize, row: &mut [Pixel], (done, samples): (u32, u32)) -> u64 {
+    let mut bad = 0;
+    let width = row.len();
+    let mut take = |x: usize, packet: u32, found: &Found| {
+        let left = (samples as usize - packet as usize * LANES).min(LANES);
+        for ((r, g), b) in found[0].iter().zip(&found[1]).zip(&found[2]).take(left) {
+            let radiance = DVec3::new(*r, *g, *b);
+            debug_assert!(radiance.is_finite(), "pixel ({x}, {y}): radiance {radiance}");
+            bad += u64::from(!radiance.is_finite());
+            row[x].add(&PathResult { radiance, unknown: 0.0 });
+        }
+    };
+    packets.row(y, width, done, samples.div_ceil(LANES as u32), &mut take);
     bad
 }
 

@@ -16,6 +16,7 @@ mod film;
 mod integrator;
 mod lights;
 mod material;
+mod packet;
 mod ray;
 pub mod scene;
 mod shapes;

@@ -4,7 +4,7 @@ mod rectangle;
 
 use glam::{DVec2, DVec3};
 
-pub use rectangle::QuadLight;
+pub use rectangle::{QuadLight, SMALL_SOLID_ANGLE};
 
 use super::ray::{Ray, SurfacePoint};
 

@@ -12,7 +12,7 @@ use crate::numeric::float::sqrt_nonneg;
 
 /// Below this solid angle (sr) the density over the solid angle is taken uniform in area: the sum of four angles less 2π holds
 /// only 10⁻¹⁵ sr, and the difference between the two samplings no longer matters.
-const SMALL_SOLID_ANGLE: f64 = 1e-5;
+pub const SMALL_SOLID_ANGLE: f64 = 1e-5;
 
 /// A quad whose front shines alike in all directions.
 #[derive(Debug)]
@@ -37,6 +37,16 @@ impl QuadLight {
         let (x, y) = (quad.u.normalize(), quad.v.normalize());
         let edges = Edges { x, y, length: 2.0 * DVec2::new(quad.u.length(), quad.v.length()) };
         Self { quad, radiance, rectangle: (x.dot(y).abs() < 1e-12).then_some(edges) }
+    }
+
+    /// Its surface.
+    pub fn quad(&self) -> &Quad {
+        &self.quad
+    }
+
+    /// Unit edges and their full lengths, m; `None` where they are not at right angles.
+    pub fn rectangle(&self) -> Option<([DVec3; 2], DVec2)> {
+        self.rectangle.as_ref().map(|edges| ([edges.x, edges.y], edges.length))
     }
 
     /// Light that arrives at a point from a point of the quad.

@@ -63,6 +63,12 @@ impl Geometry {
         Self { spheres, planes, quads, triangles: Triangles::new(meshes) }
     }
 
+    /// Spheres, planes and quads, where there is nothing else.
+    #[allow(clippy::type_complexity)] // three lists
+    pub fn analytic(&self) -> Option<(&[(Sphere, Owner)], &[(Plane, Owner)], &[(Quad, Owner)])> {
+        self.triangles.is_none().then_some((&self.spheres, &self.planes, &self.quads))
+    }
+
     /// The surface that the ray meets first.
     pub fn closest(&self, ray: &Ray) -> Option<Surface> {
         let (mut t_max, mut best) = (ray.t_max, None);

@@ -35,6 +35,16 @@ impl Quad {
         Self { center, u, v, normal, area: 4.0 * cross.length(), to_a, to_b, error }
     }
 
+    /// The vectors whose dot products with p − center are a and b.
+    pub fn dual(&self) -> (DVec3, DVec3) {
+        (self.to_a, self.to_b)
+    }
+
+    /// Bound on what a computed point of it is off by, m.
+    pub fn error(&self) -> f64 {
+        self.error
+    }
+
     /// Where in (0, `t_max`) the ray meets the quad: (t, a, b).
     pub fn hit(&self, ray: &Ray, t_max: f64) -> Option<(f64, f64, f64)> {
         let f = self.center - ray.origin;

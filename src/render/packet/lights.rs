@@ -1,0 +1,157 @@
+//! Light that arrives at a packet of points: see [`super::super::lights`], whose densities these are.
+
+use glam::DVec2;
+
+use super::super::lights::{QuadLight, SMALL_SOLID_ANGLE};
+use super::shapes::{Points3, Rays};
+use crate::numeric::lanes::{Mask, Vec3};
+use crate::numeric::simd::{Lanes, Simd};
+
+/// Light from one direction a lane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrivals<S: Simd> {
+    /// Where there is any.
+    pub some: Mask<S>,
+    /// The segments that must be free; their directions are those to the light.
+    pub shadow: Rays<S>,
+    /// What a surface facing the light has of the light's strength: 1/r² or 1/density.
+    pub strength: Lanes<S>,
+    /// Density of the direction, 1/sr.
+    pub pdf: Lanes<S>,
+}
+
+/// Segments between points.
+#[inline(always)]
+pub(super) fn between<S: Simd>(from: Vec3<S>, to: Vec3<S>) -> Rays<S> {
+    let way = to - from;
+    let distance = way.length_squared().sqrt();
+    Rays { origin: from, direction: way * (distance.number(1.0) / distance), t_max: distance }
+}
+
+/// y/√(y² + d²).
+#[inline(always)]
+fn sine<S: Simd>(y: Lanes<S>, d2: Lanes<S>) -> Lanes<S> {
+    y / y.mul_add(y, d2).sqrt()
+}
+
+/// The complex number whose argument is the angle between the planes of two edges, x and y their distances from the foot point.
+#[inline(always)]
+fn corner<S: Simd>(x: Lanes<S>, y: Lanes<S>, height: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
+    (x * y, height * x.mul_add(x, y.mul_add(y, height * height)).sqrt())
+}
+
+/// The sum of two arguments.
+#[inline(always)]
+fn sum<S: Simd>(p: (Lanes<S>, Lanes<S>), q: (Lanes<S>, Lanes<S>)) -> Lanes<S> {
+    (p.0 * q.1 + p.1 * q.0).angle_of(p.0 * q.0 - p.1 * q.1)
+}
+
+/// Where x lies between `low` and `high`, −1 to 1.
+#[inline(always)]
+fn share<S: Simd>(x: Lanes<S>, low: Lanes<S>, high: Lanes<S>, length: f64) -> Lanes<S> {
+    let a = (x - x.number(0.5) * (low + high)) * x.number(2.0 / length);
+    a.min(x.number(1.0)).max(x.number(-1.0))
+}
+
+/// A rectangle, seen from points where it fills more than a small solid angle ([`super::super::lights`]: Ureña et al. 2013).
+struct View<S: Simd> {
+    low: [Lanes<S>; 2],
+    high: [Lanes<S>; 2],
+    height: Lanes<S>,
+    start: Lanes<S>,
+    normal_z: [Lanes<S>; 2],
+    solid_angle: Lanes<S>,
+}
+
+impl<S: Simd> View<S> {
+    #[inline(always)]
+    fn new(light: &QuadLight, [x, y]: [glam::DVec3; 2], length: DVec2, from: Vec3<S>) -> Self {
+        let quad = light.quad();
+        let d = from.vector(quad.center) - from;
+        let height = d.dot(d.vector(quad.normal)).abs();
+        let (cx, cy) = (d.dot(d.vector(x)), d.dot(d.vector(y)));
+        let half = [cx.number(0.5 * length.x), cx.number(0.5 * length.y)];
+        let (low, high) = ([cx - half[0], cy - half[1]], [cx + half[0], cy + half[1]]);
+        let h2 = height * height;
+        let right = sum(corner(high[0], low[1], height), corner(-high[0], high[1], height));
+        let left = sum(corner(low[0], high[1], height), corner(-low[0], low[1], height));
+        let start = height.number(std::f64::consts::TAU) - left;
+        let normal_z = [-sine(low[1], h2), sine(high[1], h2)];
+        Self { low, high, height, start, normal_z, solid_angle: right - start }
+    }
+
+    /// Coordinates along both edges from the foot point, uniform in solid angle.
+    #[inline(always)]
+    fn sample(&self, (u, v): (Lanes<S>, Lanes<S>)) -> (Lanes<S>, Lanes<S>) {
+        let h2 = self.height * self.height;
+        let tau = u.number(std::f64::consts::TAU);
+        let turns = u.mul_add(self.solid_angle, self.start) / tau;
+        // 2π itself is 0.
+        let turns = turns.at_least(u.number(1.0)).select(turns - u.number(1.0), turns);
+        let (sin, cos) = turns.sin_cos_turns();
+        let f = cos.mul_add(self.normal_z[0], -self.normal_z[1]) / sin;
+        let y0 = self.low[1];
+        let flat = f.mul_add(f, -(h2 / y0.mul_add(y0, h2))).sqrt_nonneg();
+        let x = (self.height.with_sign(f) / flat).min(self.high[0]).max(self.low[0]);
+        let d2 = x.mul_add(x, h2);
+        let (a, b) = (sine(self.low[1], d2), sine(self.high[1], d2));
+        let s = v.mul_add(b - a, a);
+        let y = s * (d2 / (u.number(1.0) - s * s)).sqrt();
+        (x, y.min(self.high[1]).max(self.low[1]))
+    }
+}
+
+/// Light of a quad at points, by a point (u, v) of the unit square.
+#[inline(always)]
+pub(super) fn from_quad<S: Simd>(light: &QuadLight, at: &Points3<S>, u: (Lanes<S>, Lanes<S>)) -> Arrivals<S> {
+    let quad = light.quad();
+    let from = at.position;
+    let to_centre = from.vector(quad.center) - from;
+    let zero = u.0.number(0.0);
+    let before = zero.above(to_centre.dot(from.vector(quad.normal)));
+    let (one, two) = (zero.number(1.0), zero.number(2.0));
+    let (mut a, mut b) = (two * u.0 - one, two * u.1 - one);
+    let mut wide = zero.above(zero);
+    let mut solid_angle = one;
+    if let Some((axes, length)) = light.rectangle() {
+        let view = View::new(light, axes, length, from);
+        wide = view.solid_angle.above(zero.number(SMALL_SOLID_ANGLE));
+        solid_angle = view.solid_angle;
+        let (x, y) = view.sample(u);
+        a = wide.select(share(x, view.low[0], view.high[0], length.x), a);
+        b = wide.select(share(y, view.low[1], view.high[1], length.y), b);
+    }
+    let target = from.vector(quad.u).scaled_plus(a, from.vector(quad.v).scaled_plus(b, from.vector(quad.center)));
+    let end = Points3 {
+        position: target,
+        error: Vec3::new(one, one, one) * zero.number(quad.error()),
+        normal: from.vector(quad.normal),
+    };
+    let shadow = between(at.above(), end.above());
+    let pdf = wide.select(one / solid_angle, area_pdf(light, from, target));
+    let strength = one / pdf;
+    let finite = zero.number(f64::MAX).at_least(strength);
+    Arrivals { some: before & finite, shadow, strength, pdf }
+}
+
+/// Densities (1/sr) of directions from `from` to points `to` of the quad.
+#[inline(always)]
+pub(super) fn quad_pdf<S: Simd>(light: &QuadLight, from: Vec3<S>, to: Vec3<S>) -> Lanes<S> {
+    let by_area = area_pdf(light, from, to);
+    match light.rectangle() {
+        None => by_area,
+        Some((axes, length)) => {
+            let solid_angle = View::new(light, axes, length, from).solid_angle;
+            let wide = solid_angle.above(by_area.number(SMALL_SOLID_ANGLE));
+            wide.select(by_area.number(1.0) / solid_angle, by_area)
+        }
+    }
+}
+
+#[inline(always)]
+fn area_pdf<S: Simd>(light: &QuadLight, from: Vec3<S>, to: Vec3<S>) -> Lanes<S> {
+    let quad = light.quad();
+    let d = to - from;
+    let distance2 = d.length_squared();
+    distance2 * distance2.sqrt() / (d.dot(d.vector(quad.normal)).abs() * distance2.number(quad.area))
+}
