@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::RenderError;
 use super::camera::Camera;
-use super::integrator::{PathResult, Strategy, Tracer};
+use super::integrator::{PathResult, Strategy, Tracer, Watch};
+use super::layers::{Gathered, LayerSet, Sight, layer};
 use super::scene::{Scene, SceneSpec};
 use crate::control::Control;
 use crate::image::{Image, Metadata};
@@ -33,11 +34,14 @@ pub struct Options {
     pub seed: u64,
     /// How lights are found.
     pub strategy: Strategy,
+    /// Layers to gather beside the radiance; none by default, which takes no time.
+    pub layers: LayerSet,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { width: 512, height: 512, samples: 64, seed: 0, strategy: Strategy::default() }
+        let (strategy, layers) = (Strategy::default(), LayerSet::default());
+        Self { width: 512, height: 512, samples: 64, seed: 0, strategy, layers }
     }
 }
 
@@ -128,8 +132,12 @@ pub struct Film {
     /// Samples that were not finite; each of them leaves its pixel not finite. Always 0 but for a mistake of the program.
     pub not_finite: u64,
     scene: String,
+    plan: String,
     seed: u64,
     pixels: Vec<Pixel>,
+    layers: LayerSet,
+    /// One for each pixel where there are layers, else none.
+    gathered: Vec<Gathered>,
 }
 
 impl Film {
@@ -177,7 +185,9 @@ impl Film {
                 samples: Some(self.samples()),
                 seconds: Some(self.seconds),
                 program: Some(format!("goniofit {}", env!("CARGO_PKG_VERSION"))),
+                plan: Some(self.plan.clone()),
             },
+            layers: self.layers.kinds().filter_map(|kind| layer(kind, &self.gathered)).collect(),
         }
     }
 
@@ -200,6 +210,11 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     let width = options.width as usize;
     let count = u64::from(options.width) * u64::from(options.height);
     let mut pixels = reserved(options, count as usize)?;
+    let mut gathered = Vec::new();
+    if !options.layers.is_empty() {
+        gathered = reserved(options, count as usize)?;
+        gathered.resize(count as usize, Gathered::default());
+    }
     (0..count as usize).into_par_iter().map(|i| Pixel::new(options.seed, i as u64)).collect_into_vec(&mut pixels);
     let mut film = Film {
         width: options.width,
@@ -207,8 +222,11 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         seconds: 0.0,
         not_finite: 0,
         scene: scene.name.clone(),
+        plan: plan(scene, options),
         seed: options.seed,
         pixels,
+        layers: options.layers,
+        gathered,
     };
     let camera = Camera::new(&scene.camera, scene.origin, options.width, options.height);
     let tracer = Tracer::new(scene, options.strategy);
@@ -216,12 +234,19 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     let mut done = 0;
     while done < options.samples && !control.stop.requested() {
         let pass = done.clamp(1, PASS).min(options.samples - done);
-        let rows = film.pixels.par_chunks_mut(width).enumerate();
-        let bad = rows.map(|(y, row)| {
+        let mut gathered: Vec<_> = film.gathered.chunks_mut(width).map(Some).collect();
+        gathered.resize_with(options.height as usize, || None);
+        let rows = film.pixels.par_chunks_mut(width).zip(gathered).enumerate();
+        let bad = rows.map(|(y, (row, gathered))| {
             if control.stop.requested() {
                 return 0;
             }
-            let bad = render_row(&tracer, &camera, y, row, pass);
+            let bad = match gathered {
+                None => render_row(&tracer, &camera, y, row, pass, |_, (): &(), _| {}),
+                Some(g) => {
+                    render_row(&tracer, &camera, y, row, pass, |x, sight: &Sight, path| g[x].add(sight, path.radiance))
+                }
+            };
             control.progress.advance(u64::from(pass));
             bad
         });
@@ -234,27 +259,48 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
 }
 
 /// Room for `count` pixels: a picture that does not fit into memory is an error, not the end of the program.
-fn reserved(options: &Options, count: usize) -> Result<Vec<Pixel>, RenderError> {
+fn reserved<T>(options: &Options, count: usize) -> Result<Vec<T>, RenderError> {
     let mut pixels = Vec::new();
     let refused = |_| {
-        let bytes = count as f64 * size_of::<Pixel>() as f64;
+        let bytes = count as f64 * size_of::<T>() as f64;
         RenderError::Memory { width: options.width, height: options.height, gigabytes: bytes * 1e-9 }
     };
     pixels.try_reserve_exact(count).map_err(refused)?;
     Ok(pixels)
 }
 
-/// Adds `samples` paths to every pixel of a row; the number of those that were not finite.
-fn render_row(tracer: &Tracer<'_>, camera: &Camera, y: usize, row: &mut [Pixel], samples: u32) -> u64 {
+/// In one line, what is computed.
+fn plan(scene: &Scene, options: &Options) -> String {
+    let lights = match options.strategy {
+        Strategy::Combined => "lights sampled by position and by material",
+        Strategy::MaterialOnly => "lights sampled by material",
+        Strategy::LightsOnly => "lights sampled by position",
+    };
+    let layers = if options.layers.is_empty() { "none".into() } else { options.layers.names() };
+    format!("paths of at most {} scattering events, {lights}; further layers: {layers}", scene.max_bounces)
+}
+
+/// Adds `samples` paths to every pixel of a row, and tells `gather` of each, with its column and what was watched; the number of
+/// those that were not finite.
+fn render_row<W: Watch + Default>(
+    tracer: &Tracer<'_>,
+    camera: &Camera,
+    y: usize,
+    row: &mut [Pixel],
+    samples: u32,
+    mut gather: impl FnMut(usize, &W, &PathResult),
+) -> u64 {
     let mut bad = 0;
     for (x, pixel) in row.iter_mut().enumerate() {
         for _ in 0..samples {
             let jitter = DVec2::new(pixel.rng.random(), pixel.rng.random());
             let ray = camera.ray(DVec2::new(x as f64, y as f64) + jitter);
-            let path = tracer.trace(ray, &mut pixel.rng);
+            let mut watch = W::default();
+            let path = tracer.trace(ray, &mut pixel.rng, &mut watch);
             debug_assert!(path.radiance.is_finite(), "pixel ({x}, {y}): radiance {}", path.radiance);
             bad += u64::from(!path.radiance.is_finite());
             pixel.add(&path);
+            gather(x, &watch, &path);
         }
     }
     bad
@@ -279,7 +325,7 @@ mod tests {
 
     #[test]
     fn memory_that_is_not_there_is_an_error() {
-        let error = reserved(&Options::default(), usize::MAX / 2).expect_err("more than there is");
+        let error = reserved::<Pixel>(&Options::default(), usize::MAX / 2).expect_err("more than there is");
         assert!(matches!(error, RenderError::Memory { width: 512, height: 512, .. }), "{error}");
     }
 }
