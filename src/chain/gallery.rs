@@ -69,13 +69,8 @@ pub fn write_gallery(
         write_maps(folder, shown, reference, comparison, exposure)?;
         let map = difference_map(&shown.image, &reference.image, Some(range))?;
         write_bytes(&folder.join(format!("{name}.png")), &encode_png(&map.bitmap)?)?;
-        let mut caption = format!("rmse {:.2e}   relMSE {:.2e}", comparison.rmse, comparison.rel_mse);
-        if let Some(looks) = &comparison.appearance {
-            caption += &format!("   FLIP {:.4}", looks.flip.mean);
-        }
-        if comparison.masked > 0 {
-            caption += "   grey: not measured, left out";
-        }
+        let looks = comparison.appearance.as_ref().map_or(String::new(), |a| format!("   FLIP {:.4}", a.flip.mean));
+        let caption = format!("rmse {:.2e}   relMSE {:.2e}{looks}", comparison.rmse, comparison.rel_mse);
         let unit = "W/(sr m²)".to_owned();
         let scale = Scale { map: ColorMap::Diverging, low: -map.range, high: map.range, unit };
         let label = format!("{} less {}", shown.label, reference.label);
@@ -83,7 +78,8 @@ pub fn write_gallery(
     }
     let columns = pictures.len();
     let tiles = pictures.into_iter().chain(maps).collect();
-    let sheet = Sheet { title: title.into(), subtitle: subtitle.into(), columns, tiles };
+    let grey = if comparisons.iter().any(|c| c.masked > 0) { ", grey: not measured, left out" } else { "" };
+    let sheet = Sheet { title: title.into(), subtitle: format!("{subtitle}{grey}"), columns, tiles };
     write_bytes(&folder.join("sheet.png"), &encode_png(&sheet.draw()?)?)?;
     Ok(Gallery { comparisons, exposure })
 }

@@ -115,7 +115,8 @@ fn row(label: &str, c: &Comparison) -> String {
         c.rmse,
         c.rel_mse,
         c.masked,
-        sentence(c)
+        // On two lines, so that it fits a terminal.
+        sentence(c).replace("; ", ";\n    ")
     )
 }
 

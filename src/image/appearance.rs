@@ -161,6 +161,39 @@ mod tests {
         appearance(a, b, None).unwrap().unwrap()
     }
 
+    /// The pictures of data-fixtures/reference/appearance.py.
+    fn formula(steepness: f64) -> (Image, Image) {
+        let of = |test: bool| {
+            let pixel = |i: usize| {
+                let (x, y) = ((i % 48) as f64, (i / 48) as f64);
+                let ripple = if test { 0.9 + 0.1 * (1.3 * x + 0.5 * y).sin() } else { 1.0 };
+                let gain = ripple * (steepness * x / 48.0).exp2();
+                [0.0, 1.0, 2.0].map(|c: f64| gain * (0.5 + 0.4 * (0.7 * x + c).sin() * (0.3 * y - c).cos()))
+            };
+            Image { width: 48, height: 40, radiance: (0..48 * 40).map(pixel).collect(), ..Image::default() }
+        };
+        (of(true), of(false))
+    }
+
+    #[test]
+    fn numbers_are_those_of_the_reference_programs() {
+        let (test, reference) = formula(0.0);
+        let a = appearance(&test, &reference, Some(0.0)).unwrap().unwrap();
+        let (test, reference) = formula(9.0);
+        let hdr = look(&test, &reference).hdr_flip.unwrap();
+        // flip-evaluator computes in 32 bits.
+        for (name, got, want, bound) in [
+            ("FLIP, mean", a.flip.mean, 0.1853965, 2e-5),
+            ("FLIP, max", a.flip.max, 0.3193610, 2e-5),
+            ("HDR-FLIP, mean", hdr.mean, 0.1493364, 2e-5),
+            ("HDR-FLIP, max", hdr.max, 0.2180377, 2e-5),
+            ("SSIM", a.ssim, 0.960002107, 1e-9),
+        ] {
+            println!("{name}: {got:.9}, theirs {want:.9}");
+            assert!((got - want).abs() < bound, "{name}: {got} vs {want}");
+        }
+    }
+
     #[test]
     fn a_picture_looks_like_itself() {
         for (width, height) in [(1, 1), (5, 3), (40, 30)] {

@@ -122,7 +122,7 @@ pub(super) fn range_of(differences: &[Option<f64>]) -> Option<f64> {
 }
 
 /// Luminance of the picture less that of the reference, pixel by pixel; `None` where one of them is masked.
-fn differences(image: &Image, reference: &Image) -> Result<Vec<Option<f64>>, ImageError> {
+pub(super) fn differences(image: &Image, reference: &Image) -> Result<Vec<Option<f64>>, ImageError> {
     image.check_same_size(reference)?;
     let difference = |i: usize| {
         let known = !image.is_masked(i) && !reference.is_masked(i);

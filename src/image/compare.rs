@@ -33,6 +33,7 @@ pub struct Comparison {
     /// Values of either picture that are not finite; they make the numbers above not finite too.
     pub not_finite: usize,
     /// The first of them, row by row; `None` where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub first_not_finite: Option<NotFinite>,
     /// How different the pictures look; `None` where nothing is compared, or a value is not finite.
     pub appearance: Option<Appearance>,

@@ -158,7 +158,7 @@ mod tests {
                 program: Some("goniofit 0.1.0".into()),
                 plan: None,
             },
-            layers: LayerKind::ALL.map(|kind| layer(kind)).to_vec(),
+            layers: LayerKind::ALL.map(layer).to_vec(),
         }
     }
 
@@ -191,6 +191,17 @@ mod tests {
         let back = read_exr(&path).unwrap();
         assert!(back.radiance[0].iter().zip(&image.radiance[0]).all(|(a, b)| a.to_bits() == b.to_bits()));
         assert!(back.radiance[1][0].is_nan());
+    }
+
+    #[test]
+    fn missing_channels_are_named() {
+        let plane = |name: &str| Channel::new(name, ex::FlatSamples::F32(vec![0.0; 4]));
+        let list = ex::AnyChannels::sort(["G", "R", "depth.Z"].map(plane).into_iter().collect());
+        let layer = ex::Layer::new((2, 2), ex::LayerAttributes::default(), ex::Encoding::default(), list);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        ex::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+        let error = decode_exr(Path::new("a.exr"), bytes.into_inner()).unwrap_err().to_string();
+        assert_eq!(error, "a.exr: expected channels R, G, B, or Y alone, found channels G, R, depth.Z");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Maps of where and how two pictures differ, with their scale bars, as tiles of a sheet.
 
-use super::colormap::{difference_map, range_of, value_map};
+use super::colormap::{differences, range_of, value_map};
 use super::compare::REL_MSE_FLOOR;
 use super::sheet::{Scale, Sheet, Tile};
 use super::significance::z_map;
@@ -54,34 +54,67 @@ pub fn map_tiles(
     comparison: &Comparison,
     exposure: Option<f64>,
 ) -> Result<Vec<Tile>, ImageError> {
-    let mut tiles = Vec::new();
     let known = image.known_with(reference)?;
-    let tile = |values: &[Option<f64>], range: Option<f64>, map: ColorMap, unit: &str, label: &str, caption: String| {
-        let range = range.or_else(|| range_of(values)).unwrap_or(1.0);
-        let low = if map == ColorMap::Diverging { -range } else { 0.0 };
-        let pixels = value_map(values, map, range);
-        let picture = Bitmap { width: image.width, height: image.height, pixels };
-        let scale = Some(Scale { map, low, high: range, unit: unit.into() });
-        Tile { scale, ..Tile::enlarged(picture, label, caption) }
+    let noise = z_map(image, reference, &known).zip(comparison.significance.as_ref());
+    let noise = noise.map(|(z, s)| Map {
+        label: "difference over its noise",
+        caption: format!("{} of {} pixels beyond noise (1 % for all)", s.pixels_differing, s.pixels),
+        values: z,
+        range: Some(Z_RANGE),
+        colors: ColorMap::Diverging,
+        unit: "σ",
+    });
+    let difference = Map {
+        label: "difference of luminance",
+        caption: format!("rmse {:.2e}   largest {:.2e}", comparison.rmse, comparison.max_abs),
+        values: differences(image, reference)?,
+        range: None,
+        colors: ColorMap::Diverging,
+        unit: "W/(sr m²)",
     };
-    if let Some((z, s)) = z_map(image, reference, &known).zip(comparison.significance.as_ref()) {
-        let caption = format!("{} of {} pixels beyond noise, at 1 % for all", s.pixels_differing, s.pixels);
-        tiles.push(tile(&z, Some(Z_RANGE), ColorMap::Diverging, "σ", "difference over its noise", caption));
-    }
-    let map = difference_map(image, reference, None)?;
-    let caption = format!("rmse {:.2e}   largest {:.2e}", comparison.rmse, comparison.max_abs);
-    let scale = Scale { map: ColorMap::Diverging, low: -map.range, high: map.range, unit: "W/(sr m²)".into() };
-    tiles.push(Tile { scale: Some(scale), ..Tile::enlarged(map.bitmap, "difference of luminance", caption) });
     let mean = |p: &[f64; 3]| (p[0] + p[1] + p[2]) / 3.0;
-    let values: Vec<_> =
-        relative(image, reference).iter().zip(&known).map(|(p, known)| known.then(|| mean(p))).collect();
-    let caption = format!("relMSE {:.2e}", comparison.rel_mse);
-    tiles.push(tile(&values, None, ColorMap::Diverging, "", "relative difference", caption));
-    if let Some((map, looks)) = flip_map(image, reference, exposure)?.zip(comparison.appearance.as_ref()) {
-        let caption = format!("mean {:.4}   largest {:.3}", looks.flip.mean, looks.flip.max);
-        tiles.push(tile(&map, None, ColorMap::Magma, "", "FLIP: how different it looks", caption));
+    let relative = relative(image, reference);
+    let relative = Map {
+        label: "relative difference",
+        caption: format!("relMSE {:.2e}", comparison.rel_mse),
+        values: relative.iter().zip(&known).map(|(p, known)| known.then(|| mean(p))).collect(),
+        range: None,
+        colors: ColorMap::Diverging,
+        unit: "",
+    };
+    let flip = flip_map(image, reference, exposure)?.zip(comparison.appearance.as_ref());
+    let flip = flip.map(|(values, looks)| Map {
+        label: "FLIP: how different it looks",
+        caption: format!("mean {:.4}   largest {:.3}", looks.flip.mean, looks.flip.max),
+        values,
+        range: None,
+        colors: ColorMap::Magma,
+        unit: "",
+    });
+    let maps = noise.into_iter().chain([difference, relative]).chain(flip);
+    Ok(maps.map(|map| map.tile(image.width, image.height)).collect())
+}
+
+/// What a map shows, and how.
+struct Map {
+    label: &'static str,
+    caption: String,
+    /// `None` is grey.
+    values: Vec<Option<f64>>,
+    /// The end of the scale; without one that which shows the values well.
+    range: Option<f64>,
+    colors: ColorMap,
+    unit: &'static str,
+}
+
+impl Map {
+    fn tile(self, width: usize, height: usize) -> Tile {
+        let high = self.range.or_else(|| range_of(&self.values)).unwrap_or(1.0);
+        let low = if self.colors == ColorMap::Diverging { -high } else { 0.0 };
+        let picture = Bitmap { width, height, pixels: value_map(&self.values, self.colors, high) };
+        let scale = Some(Scale { map: self.colors, low, high, unit: self.unit.into() });
+        Tile { scale, ..Tile::enlarged(picture, self.label, self.caption) }
     }
-    Ok(tiles)
 }
 
 /// A sheet of a picture, its reference and the maps of their difference.
@@ -98,8 +131,8 @@ pub fn comparison_sheet(
     let preview = |(name, p): (&str, &Image)| Tile::enlarged(develop(p, shown), name, String::new());
     let mut tiles = vec![preview(image), preview(reference)];
     tiles.extend(map_tiles(image.1, reference.1, comparison, exposure)?);
-    let masked = if comparison.masked > 0 { ", grey is masked" } else { "" };
-    let subtitle = format!("{} pixels compared{masked}; previews at {shown:+.2} stops", comparison.pixels);
+    let grey = "grey: masked or, over noise, equal without any";
+    let subtitle = format!("{} pixels compared; {grey}; previews at {shown:+.2} stops", comparison.pixels);
     Ok(Sheet { title: format!("{} less {}", image.0, reference.0), subtitle, columns: 3, tiles })
 }
 

@@ -3,6 +3,7 @@
 
 mod bench;
 mod chain;
+mod compare;
 mod effects;
 mod failures;
 mod fit_file;
