@@ -9,16 +9,16 @@ use super::RenderError;
 use super::camera::Camera;
 use super::integrator::{PathResult, Strategy, Tracer, Watch};
 use super::layers::{Gathered, LayerSet, Sight, layer};
+use super::pixel::Pixel;
 use super::scene::{Scene, SceneSpec};
 use crate::control::Control;
 use crate::image::{Image, Metadata};
-use crate::numeric::float::sqrt_nonneg;
-use crate::numeric::random::{Purpose, RngExt, Stream, stream};
+use crate::numeric::random::RngExt;
 
 /// Samples of a pixel in one pass at most.
 const PASS: u32 = 32;
 
-/// Pixels of a picture at most: 8192 × 8192, which takes about 12 GB with all its layers.
+/// Pixels of a picture at most: 8192 × 8192, which takes about 12 GB, and with all of [`LayerSet::NAMED`] about 2.5 times that.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// What to render.
@@ -72,51 +72,6 @@ impl Options {
             return Err(RenderError::Field { origin, field, value, constraint });
         }
         Ok(())
-    }
-}
-
-/// What one pixel has gathered. Sums are taken about the first sample, so that the variance of nearly equal samples, or of
-/// samples of 10²⁰, keeps its digits.
-#[derive(Debug, Clone)]
-struct Pixel {
-    rng: Stream,
-    samples: u32,
-    unknown: f64,
-    first: DVec3,
-    sum: DVec3,
-    squares: DVec3,
-}
-
-impl Pixel {
-    fn new(seed: u64, index: u64) -> Self {
-        let rng = stream(seed, Purpose::Pixel, index);
-        Self { rng, samples: 0, unknown: 0.0, first: DVec3::ZERO, sum: DVec3::ZERO, squares: DVec3::ZERO }
-    }
-
-    fn add(&mut self, path: &PathResult) {
-        if self.samples == 0 {
-            self.first = path.radiance;
-        }
-        let d = path.radiance - self.first;
-        self.sum += d;
-        self.squares += d * d;
-        self.samples += 1;
-        self.unknown += path.unknown;
-    }
-
-    fn mean(&self) -> DVec3 {
-        if self.samples == 0 { DVec3::ZERO } else { self.first + self.sum / f64::from(self.samples) }
-    }
-
-    fn standard_error(&self) -> DVec3 {
-        let n = f64::from(self.samples);
-        if n < 2.0 {
-            return DVec3::INFINITY;
-        }
-        let mean = self.sum / n;
-        let variance = (self.squares - n * mean * mean) / (n - 1.0);
-        // Round-off of the squares can reach below 0; NaN stays NaN.
-        DVec3::from_array(variance.to_array().map(|v| sqrt_nonneg(v.clamp(0.0, f64::INFINITY) / n)))
     }
 }
 

@@ -17,6 +17,7 @@ mod integrator;
 mod layers;
 mod lights;
 mod material;
+mod pixel;
 mod ray;
 pub mod scene;
 mod shapes;
