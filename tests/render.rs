@@ -204,7 +204,7 @@ fn the_ways_of_finding_light_agree() {
     for (name, samples) in [("sphere-on-plane", 400), ("furnace", 400)] {
         let built = scene(&glossy(name));
         let of = |strategy, seed| {
-            let options = Options { width: 24, height: 24, samples, seed, strategy };
+            let options = Options { width: 24, height: 24, samples, seed, strategy, ..Options::default() };
             mean(&render(&built, &options, Control::silent()).expect("renders"))
         };
         let (combined, noise) = of(Strategy::Combined, 1);

@@ -8,8 +8,8 @@ use super::error::ChainError;
 use super::output::write_bytes;
 use crate::image::sheet::{Scale, Sheet, Tile};
 use crate::image::{
-    Bitmap, ColorMap, Comparison, Image, ImageError, compare, develop, difference_map, difference_range, encode_exr,
-    encode_png, exposure_for,
+    Bitmap, ColorMap, Comparison, Image, ImageError, compare_at, comparison_sheet, develop, difference, difference_map,
+    difference_range, encode_exr, encode_png, exposure_for,
 };
 
 /// A picture with its name, in file names and above the picture.
@@ -34,22 +34,6 @@ pub struct Gallery {
     pub exposure: f64,
 }
 
-/// The picture less the reference, pixel by pixel, with the error of the difference; masked where either is.
-#[must_use]
-pub fn difference(image: &Image, reference: &Image) -> Image {
-    let zip = |a: &[[f64; 3]], b: &[[f64; 3]], f: fn(f64, f64) -> f64| -> Vec<[f64; 3]> {
-        a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| f(a[c], b[c]))).collect()
-    };
-    let errors = image.standard_error.as_ref().zip(reference.standard_error.as_ref());
-    let masks = image.mask.as_ref().zip(reference.mask.as_ref());
-    Image {
-        radiance: zip(&image.radiance, &reference.radiance, |a, b| a - b),
-        standard_error: errors.map(|(a, b)| zip(a, b, f64::hypot)),
-        mask: masks.map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.max(*b)).collect()),
-        ..image.clone()
-    }
-}
-
 /// Writes `reference` and every other picture as EXR and PNG, the differences likewise, and a contact sheet of all
 /// (`sheet.png`). All previews share one exposure (stops; by the reference where none is given), all difference maps one scale.
 ///
@@ -70,31 +54,48 @@ pub fn write_gallery(
         write_bytes(&folder.join(format!("{}.png", shown.file)), &encode_png(&bitmap)?)?;
         Ok(bitmap)
     };
-    let comparisons =
-        others.iter().map(|shown| compare(&shown.image, &reference.image)).collect::<Result<Vec<_>, _>>()?;
+    let comparisons = others
+        .iter()
+        .map(|shown| compare_at(&shown.image, &reference.image, Some(exposure)))
+        .collect::<Result<Vec<_>, _>>()?;
     let range = shared_range(&reference.image, others)?;
-    let mut pictures = vec![tile(preview(reference)?, &reference.label, String::new())];
+    let mut pictures = vec![Tile::enlarged(preview(reference)?, &reference.label, String::new())];
     let mut maps = vec![legend(&reference.image)];
     for (shown, comparison) in others.iter().zip(&comparisons) {
-        pictures.push(tile(preview(shown)?, &shown.label, String::new()));
+        pictures.push(Tile::enlarged(preview(shown)?, &shown.label, String::new()));
         let name = &shown.difference_file;
-        write_bytes(&folder.join(format!("{name}.exr")), &encode_exr(&difference(&shown.image, &reference.image))?)?;
+        let exact = difference(&shown.image, &reference.image, Some(exposure))?;
+        write_bytes(&folder.join(format!("{name}.exr")), &encode_exr(&exact)?)?;
+        write_maps(folder, shown, reference, comparison, exposure)?;
         let map = difference_map(&shown.image, &reference.image, Some(range))?;
         write_bytes(&folder.join(format!("{name}.png")), &encode_png(&map.bitmap)?)?;
-        let mut caption = format!("rmse {:.2e}   relMSE {:.2e}", comparison.rmse, comparison.rel_mse);
-        if comparison.masked > 0 {
-            caption += "   grey: not measured, left out";
-        }
+        let looks = comparison.appearance.as_ref().map_or(String::new(), |a| format!("   FLIP {:.4}", a.flip.mean));
+        let caption = format!("rmse {:.2e}   relMSE {:.2e}{looks}", comparison.rmse, comparison.rel_mse);
         let unit = "W/(sr m²)".to_owned();
         let scale = Scale { map: ColorMap::Diverging, low: -map.range, high: map.range, unit };
         let label = format!("{} less {}", shown.label, reference.label);
-        maps.push(Tile { scale: Some(scale), ..tile(map.bitmap, &label, caption) });
+        maps.push(Tile { scale: Some(scale), ..Tile::enlarged(map.bitmap, &label, caption) });
     }
     let columns = pictures.len();
     let tiles = pictures.into_iter().chain(maps).collect();
-    let sheet = Sheet { title: title.into(), subtitle: subtitle.into(), columns, tiles };
+    let grey = if comparisons.iter().any(|c| c.masked > 0) { ", grey: not measured, left out" } else { "" };
+    let sheet = Sheet { title: title.into(), subtitle: format!("{subtitle}{grey}"), columns, tiles };
     write_bytes(&folder.join("sheet.png"), &encode_png(&sheet.draw()?)?)?;
     Ok(Gallery { comparisons, exposure })
+}
+
+/// All maps of one picture's difference with their scales, in the file of the difference with `maps` in the place of `difference`.
+fn write_maps(
+    folder: &Path,
+    shown: &Shown,
+    reference: &Shown,
+    comparison: &Comparison,
+    exposure: f64,
+) -> Result<(), ChainError> {
+    let (image, reference) = ((shown.label.as_str(), &shown.image), (reference.label.as_str(), &reference.image));
+    let sheet = comparison_sheet(image, reference, comparison, Some(exposure))?;
+    let name = shown.difference_file.replacen("difference", "maps", 1);
+    write_bytes(&folder.join(format!("{name}.png")), &encode_png(&sheet.draw()?)?)
 }
 
 /// The range that shows every picture's difference: the largest of those that differ, 1 where none does.
@@ -107,12 +108,6 @@ fn shared_range(reference: &Image, others: &[Shown]) -> Result<f64, ImageError> 
     Ok(range.unwrap_or(1.0))
 }
 
-/// Small pictures are enlarged by a whole factor, so that labels have room.
-fn tile(picture: Bitmap, label: &str, caption: String) -> Tile {
-    let factor = 320usize.div_ceil(picture.width.max(1));
-    Tile { picture: picture.enlarged(factor), label: label.into(), caption, scale: None }
-}
-
 /// The reference's own noise, so that differences can be judged against it.
 fn legend(reference: &Image) -> Tile {
     let noise = Image {
@@ -121,7 +116,7 @@ fn legend(reference: &Image) -> Tile {
         ..reference.clone()
     };
     let exposure = exposure_for(&noise);
-    tile(
+    Tile::enlarged(
         develop(&noise, exposure),
         "standard error of the pixels",
         format!("white is {:.1e} W/(sr m²)", (-exposure).exp2()),

@@ -19,7 +19,7 @@ mod surrogate;
 
 pub use demo::{Demo, DemoFit, DemoOptions, demo};
 pub use error::ChainError;
-pub use gallery::{Gallery, Shown, difference, write_gallery};
+pub use gallery::{Gallery, Shown, write_gallery};
 pub use library::{BuiltInMaterial, MATERIALS};
 pub use measure::{measure, measure_raw, reduced, tabulate, with_job};
 pub use pictures::{Stage, picture, picture_of};

@@ -5,6 +5,7 @@
 //! stdout but a command's result, so `--json` output can always be parsed.
 
 mod compare;
+mod comparison;
 mod convert;
 mod demo;
 mod effects;

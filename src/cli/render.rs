@@ -8,13 +8,13 @@ use super::failure::Failure;
 use super::output::{check_folder, keeps_inputs, read_text, stdout_is_free, write_bytes};
 use super::ui::{self, Ui};
 use crate::chain::{self, Stage};
-use crate::image::{Image, develop, encode_exr, encode_png, exposure_for};
-use crate::render::{Options, SceneSpec};
+use crate::image::{Image, LayerKind, develop, encode_exr, encode_png, exposure_for};
+use crate::render::{LayerSet, Options, SceneSpec};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit render --scene sphere-on-plane --material gold.json --out gold.exr --png gold.png
-  goniofit render my-scene.toml --samples 256 --out picture.exr")]
+  goniofit render my-scene.toml --samples 256 --out picture.exr --layers albedo,normal,depth")]
 pub(super) struct Args {
     /// A scene file; `-` is stdin
     #[arg(value_name = "SCENE.toml", conflicts_with = "scene")]
@@ -33,6 +33,9 @@ pub(super) struct Args {
     /// Exposure of the preview, stops (default: the brightest 1 % clips)
     #[arg(long, allow_negative_numbers = true, requires = "png", value_parser = parse_exposure)]
     exposure: Option<f64>,
+    /// Further layers of the linear picture: albedo, normal, depth, samples, direct, indirect
+    #[arg(long, value_name = "A,B,…", value_delimiter = ',', value_parser = parse_layer)]
+    layers: Vec<LayerKind>,
 }
 
 /// What pictures are made of.
@@ -59,6 +62,13 @@ pub(super) struct PictureArgs {
 pub(super) fn parse_exposure(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().ok().filter(|v| (-100.0..=100.0).contains(v));
     value.ok_or_else(|| "expected a number of stops from -100 to 100".into())
+}
+
+fn parse_layer(text: &str) -> Result<LayerKind, String> {
+    let known = LayerSet::NAMED.into_iter().find(|(name, _)| *name == text.trim());
+    known
+        .map(|(_, kind)| kind)
+        .ok_or_else(|| format!("expected layers out of {}", LayerSet::NAMED.map(|(name, _)| name).join(", ")))
 }
 
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -106,7 +116,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         check_folder(png)?;
         stdout_is_free(png, ui)?;
     }
-    let options = args.picture.options(&stage);
+    let options = Options { layers: LayerSet::of(&args.layers), ..args.picture.options(&stage) };
     let image = match &args.material {
         Some(name) => chain::picture_of(name, args.picture.rgb.as_ref(), &stage, &options, ui.control())?,
         None => chain::picture(&stage, None, &options, ui.control())?,
@@ -137,6 +147,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let object = json!({
         "out": args.out, "png": args.png, "scene": stage.spec.name, "width": image.width, "height": image.height,
         "samples": samples, "seconds": seconds, "seed": options.seed, "unmeasured_share": unknown, "mean": mean(&image),
+        "layers": image.layers.iter().map(|l| l.kind).collect::<Vec<_>>(),
     });
     let taken = [Some(&args.out), args.png.as_ref()].into_iter().flatten().any(|p| p.as_os_str() == "-");
     if !taken {

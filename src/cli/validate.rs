@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
+use super::comparison::sentence;
 use super::failure::Failure;
 use super::info::Reading;
 use super::output::{keeps_inputs, make_folder, write_text};
@@ -12,6 +13,7 @@ use super::render::{PictureArgs, parse_exposure};
 use super::ui::{self, Ui};
 use crate::brdf::Material;
 use crate::chain::{self, Shown, Source, Stage};
+use crate::image::{Appearance, Comparison};
 use crate::measurement::formats;
 use crate::render::{Material as Subject, Options};
 
@@ -28,7 +30,7 @@ pub(super) struct Args {
     /// Exposure of the previews, stops (default: by the table's picture, lamps left aside)
     #[arg(long, allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: Option<f64>,
-    /// Folder to write to: table.exr, fit-1.exr, difference-1.exr …, previews, sheet.png, numbers.json
+    /// Folder to write to: table.exr, fit-1.exr, difference-1.exr, maps-1.png …, previews, sheet.png, numbers.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -74,7 +76,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         format!("{} scene, {} samples a pixel", stage.spec.name, reference.image.metadata.samples.unwrap_or(0));
     let gallery = chain::write_gallery(&args.out, &name, &subtitle, reference, others, args.exposure)?;
     let rows: Vec<_> = (fits.iter().zip(&gallery.comparisons).enumerate())
-        .map(|(k, ((file, m), c))| json!({ "fit": file, "model": m.model(), "picture": format!("fit-{}.exr", k + 1), "image": c }))
+        .map(|(k, ((file, m), c))| json!({ "fit": file, "model": m.model(), "picture": format!("fit-{}.exr", k + 1), "maps": format!("maps-{}.png", k + 1), "image": c, "statement": sentence(c) }))
         .collect();
     let object = json!({
         "measurement": args.measurement, "scene": stage.spec.name, "samples": options.samples, "seed": options.seed,
@@ -83,23 +85,39 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let numbers = serde_json::to_string_pretty(&object).map_err(|e| Failure::work(e.to_string()))?;
     write_text(&args.out.join("numbers.json"), &(numbers + "\n"))?;
     let mut text = format!("{name}, {} scene, {} samples a pixel\n", stage.spec.name, options.samples);
-    let _ = writeln!(text, "  {:28} {:>10} {:>10} {:>8} {:>8}  beyond noise", "", "rmse", "relMSE", "PSNR", "masked");
+    let _ = writeln!(
+        text,
+        "  {:24} {:>9} {:>9} {:>6} {:>7} {:>6} {:>7}",
+        "", "rmse", "relMSE", "PSNR", "FLIP", "ΔE2000", "masked"
+    );
     for (file, _) in fits.iter().skip(gallery.comparisons.len()) {
         ui.warn(&format!("{file}: not rendered"));
     }
     for ((file, m), c) in fits.iter().zip(&gallery.comparisons) {
-        let differs = c.significance.as_ref().map_or("–", |s| if s.differs { "yes" } else { "no" });
         if let Some(note) = &c.note {
             ui.warn(note);
         }
-        let psnr = c.psnr.map_or("–".into(), |p| format!("{p:.1}"));
-        let label = format!("{file} ({})", m.model());
-        let _ =
-            writeln!(text, "  {label:28} {:>10.3e} {:>10.3e} {psnr:>8} {:>8}  {differs}", c.rmse, c.rel_mse, c.masked);
+        text.push_str(&row(&format!("{file} ({})", m.model()), c));
     }
     let _ = writeln!(text, "  written to {}", args.out.display());
     ui.result(&text, &object);
     Ok(())
+}
+
+/// The numbers of one fit, and what they mean.
+fn row(label: &str, c: &Comparison) -> String {
+    let psnr = c.psnr.map_or("–".into(), |p| format!("{p:.1}"));
+    let looks = |f: fn(&Appearance) -> String| c.appearance.as_ref().map_or("–".into(), f);
+    let flip = looks(|a| format!("{:.4}", a.flip.mean));
+    let delta_e = looks(|a| format!("{:.2}", a.delta_e_2000.mean));
+    format!(
+        "  {label:24} {:>9.2e} {:>9.2e} {psnr:>6} {flip:>7} {delta_e:>6} {:>7}\n    {}\n",
+        c.rmse,
+        c.rel_mse,
+        c.masked,
+        // On two lines, so that it fits a terminal.
+        sentence(c).replace("; ", ";\n    ")
+    )
 }
 
 /// What stands above a fit's picture: its model, and its file where there are several.

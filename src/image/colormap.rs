@@ -1,5 +1,6 @@
 //! False colours, and pictures of differences.
 
+use super::color::luminance;
 use super::{Bitmap, Image, ImageError};
 
 /// What a value looks like.
@@ -9,6 +10,9 @@ pub enum ColorMap {
     Diverging,
     /// Dark blue to yellow, equal steps to the eye: values from 0 up. Anchors of viridis (Smith & van der Walt 2015).
     Sequential,
+    /// Black over purple to pale yellow, equal steps to the eye: ꟻLIP, as its authors show it. Anchors of magma (Smith & van der
+    /// Walt 2015).
+    Magma,
 }
 
 const DIVERGING: [[u8; 3]; 11] = [
@@ -37,6 +41,18 @@ const SEQUENTIAL: [[u8; 3]; 9] = [
     [253, 231, 37],
 ];
 
+const MAGMA: [[u8; 3]; 9] = [
+    [0, 0, 4],
+    [29, 17, 71],
+    [81, 18, 124],
+    [130, 38, 129],
+    [182, 54, 121],
+    [230, 81, 100],
+    [251, 136, 97],
+    [254, 194, 135],
+    [252, 253, 191],
+];
+
 /// What is unknown looks like this.
 pub const UNKNOWN: [u8; 3] = [150, 150, 150];
 
@@ -47,6 +63,7 @@ impl ColorMap {
         let anchors: &[[u8; 3]] = match self {
             Self::Diverging => &DIVERGING,
             Self::Sequential => &SEQUENTIAL,
+            Self::Magma => &MAGMA,
         };
         let position = t.clamp(0.0, 1.0) * (anchors.len() - 1) as f64;
         let i = (position as usize).min(anchors.len() - 2);
@@ -72,13 +89,19 @@ pub struct DifferenceMap {
 pub fn difference_map(image: &Image, reference: &Image, range: Option<f64>) -> Result<DifferenceMap, ImageError> {
     let differences = differences(image, reference)?;
     let range = range.or_else(|| range_of(&differences)).unwrap_or(1.0);
-    let color = |d: &Option<f64>| match d {
-        None => UNKNOWN,
-        Some(d) if d.is_nan() => [255, 0, 255],
-        Some(d) => ColorMap::Diverging.color(0.5 + 0.5 * d / range),
-    };
-    let pixels = differences.iter().map(color).collect();
+    let pixels = value_map(&differences, ColorMap::Diverging, range);
     Ok(DifferenceMap { bitmap: Bitmap { width: image.width, height: image.height, pixels }, range })
+}
+
+/// Colours of values from 0, or from −`range` where the map is diverging, to `range`.
+pub(super) fn value_map(values: &[Option<f64>], map: ColorMap, range: f64) -> Vec<[u8; 3]> {
+    let position = |v: f64| if map == ColorMap::Diverging { 0.5 + 0.5 * v / range } else { v / range };
+    let color = |v: &Option<f64>| match v {
+        None => UNKNOWN,
+        Some(v) if v.is_nan() => [255, 0, 255],
+        Some(v) => map.color(position(*v)),
+    };
+    values.iter().map(color).collect()
 }
 
 /// The range that shows the difference of two pictures well, W/(sr·m²): the 99.5th percentile of the absolute difference of
@@ -90,7 +113,8 @@ pub fn difference_range(image: &Image, reference: &Image) -> Result<Option<f64>,
     Ok(range_of(&differences(image, reference)?))
 }
 
-fn range_of(differences: &[Option<f64>]) -> Option<f64> {
+/// [`difference_range`] of any values.
+pub(super) fn range_of(differences: &[Option<f64>]) -> Option<f64> {
     let mut sizes: Vec<f64> = differences.iter().flatten().map(|d| d.abs()).filter(|d| d.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
     let most = sizes.get(sizes.len() * 995 / 1000).filter(|d| **d > 0.0);
@@ -98,18 +122,13 @@ fn range_of(differences: &[Option<f64>]) -> Option<f64> {
 }
 
 /// Luminance of the picture less that of the reference, pixel by pixel; `None` where one of them is masked.
-fn differences(image: &Image, reference: &Image) -> Result<Vec<Option<f64>>, ImageError> {
+pub(super) fn differences(image: &Image, reference: &Image) -> Result<Vec<Option<f64>>, ImageError> {
     image.check_same_size(reference)?;
     let difference = |i: usize| {
         let known = !image.is_masked(i) && !reference.is_masked(i);
         known.then(|| luminance(image.radiance[i]) - luminance(reference.radiance[i]))
     };
     Ok((0..image.radiance.len()).map(difference).collect())
-}
-
-/// Luminance of linear sRGB (Rec. ITU-R BT.709).
-fn luminance(p: [f64; 3]) -> f64 {
-    0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]
 }
 
 /// The next 1, 2 or 5 times a power of ten, for x > 0.

@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::significance::{Significance, significance};
-use super::{Image, ImageError, MASKED_SHARE};
+use super::{Appearance, Image, ImageError, MASKED_SHARE, appearance};
 use crate::numeric::float::larger;
 
 /// Added to the squared reference in [`Comparison::rel_mse`], so that dark pixels do not dominate, (W/(sr·m²))².
-const REL_MSE_FLOOR: f64 = 1e-2;
+pub(super) const REL_MSE_FLOOR: f64 = 1e-2;
 
 /// Differences between a picture and its reference over all pixels that neither masks, all channels alike.
 ///
@@ -32,22 +32,43 @@ pub struct Comparison {
     pub reference_mean: [f64; 3],
     /// Values of either picture that are not finite; they make the numbers above not finite too.
     pub not_finite: usize,
+    /// The first of them, row by row; `None` where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_not_finite: Option<NotFinite>,
+    /// How different the pictures look; `None` where nothing is compared, or a value is not finite.
+    pub appearance: Option<Appearance>,
     /// Whether the differences exceed the noise; `None` where that can't be said.
     pub significance: Option<Significance>,
     /// Why there is no `significance`, or why not to trust it.
     pub note: Option<String>,
 }
 
-/// Compares a picture with its reference.
+/// Where a picture has a value that is not finite.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct NotFinite {
+    /// Whether it is in the reference.
+    pub in_reference: bool,
+    /// Column and row of the pixel, and the channel.
+    pub at: (usize, usize, usize),
+}
+
+/// Compares a picture with its reference, at the exposure of the reference's preview where looks are compared.
 ///
 /// # Errors
 /// [`ImageError::Sizes`] where the sizes differ, [`ImageError::Layer`] where a layer does not fit its picture.
 pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, ImageError> {
-    image.check_same_size(reference)?;
-    let known: Vec<bool> = (0..image.radiance.len()).map(|i| !image.is_masked(i) && !reference.is_masked(i)).collect();
+    compare_at(image, reference, None)
+}
+
+/// [`compare`], at an exposure (stops).
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_at(image: &Image, reference: &Image, exposure: Option<f64>) -> Result<Comparison, ImageError> {
+    let known = image.known_with(reference)?;
     let pixels = known.iter().filter(|known| **known).count();
     let (mut squares, mut relative, mut max_abs, mut peak) = (0.0, 0.0, 0.0f64, 0.0f64);
-    let (mut sum, mut reference_sum, mut not_finite) = ([0.0; 3], [0.0; 3], 0);
+    let (mut sum, mut reference_sum, mut not_finite, mut first) = ([0.0; 3], [0.0; 3], 0, None);
     for i in (0..known.len()).filter(|i| known[*i]) {
         for c in 0..3 {
             let (x, r) = (image.radiance[i][c], reference.radiance[i][c]);
@@ -58,7 +79,10 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, ImageErro
             peak = peak.max(r);
             sum[c] += x;
             reference_sum[c] += r;
-            not_finite += usize::from(!x.is_finite()) + usize::from(!r.is_finite());
+            for (_, in_reference) in [(x, false), (r, true)].into_iter().filter(|(value, _)| !value.is_finite()) {
+                not_finite += 1;
+                first = first.or(Some(NotFinite { in_reference, at: (i % image.width, i / image.width, c) }));
+            }
         }
     }
     // 0/0 where nothing was compared: NaN, on purpose.
@@ -79,6 +103,8 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, ImageErro
         mean: mean(sum),
         reference_mean: mean(reference_sum),
         not_finite,
+        first_not_finite: first,
+        appearance: appearance(image, reference, exposure)?,
         significance,
         note,
     })
@@ -102,6 +128,12 @@ impl Image {
         self.mask.as_ref().and_then(|mask| mask.get(i)).is_some_and(|share| *share > MASKED_SHARE)
     }
 
+    /// Which pixels neither picture masks.
+    pub(super) fn known_with(&self, reference: &Self) -> Result<Vec<bool>, ImageError> {
+        self.check_same_size(reference)?;
+        Ok((0..self.radiance.len()).map(|i| !self.is_masked(i) && !reference.is_masked(i)).collect())
+    }
+
     /// Whether two pictures have the same size and layers of that size.
     pub(super) fn check_same_size(&self, reference: &Self) -> Result<(), ImageError> {
         let (image, other) = ((self.width, self.height), (reference.width, reference.height));
@@ -120,7 +152,9 @@ impl Image {
             ("stderr", self.standard_error.as_ref().map(Vec::len)),
             ("mask", self.mask.as_ref().map(Vec::len)),
         ];
-        for (layer, found) in layers {
+        let further = self.layers.iter().flat_map(|l| l.kind.channels().iter().zip(&l.planes));
+        let further = further.map(|(name, plane)| (*name, Some(plane.len())));
+        for (layer, found) in layers.into_iter().chain(further) {
             if let Some(found) = found.filter(|found| *found != width * height) {
                 return Err(ImageError::Layer { layer, width, height, found });
             }
@@ -162,7 +196,8 @@ mod tests {
         assert_eq!((c.rmse, c.pixels, c.masked), (0.0, 3, 1));
         image.radiance[2][1] = f64::NAN;
         let c = compare(&image, &reference).unwrap();
-        assert!(c.rmse.is_nan() && c.max_abs.is_nan() && c.not_finite == 1);
+        assert!(c.rmse.is_nan() && c.max_abs.is_nan() && c.not_finite == 1 && c.appearance.is_none());
+        assert_eq!(c.first_not_finite, Some(NotFinite { in_reference: false, at: (2, 0, 1) }));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! OpenEXR files: `R`, `G`, `B` hold the radiance, so any viewer opens it; `stderr.R` … its standard error, `mask` the expected
-//! share of the pixel's light that nobody measured, 0 to 1 (1 too where a stopped render left a pixel without samples).
+//! share of the pixel's light that nobody measured, 0 to 1 (1 too where a stopped render left a pixel without samples). Further
+//! layers have the channels that [`LayerKind::channels`] names: `albedo.R` …, `normal.X` …, `depth.Z`, `samples`, `direct.R` ….
 //!
 //! Values are written as 32-bit floats, compressed without loss; how the picture came about stands in text attributes named
 //! `goniofit.…`.
@@ -9,7 +10,7 @@ use std::path::Path;
 use exr::prelude as ex;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 
-use super::{Image, ImageError, Metadata};
+use super::{Image, ImageError, Layer, LayerKind, Metadata};
 
 type Channel = ex::AnyChannel<ex::FlatSamples>;
 type Attributes = std::collections::HashMap<ex::Text, ex::AttributeValue>;
@@ -69,17 +70,13 @@ pub fn decode_exr(path: &Path, bytes: Vec<u8>) -> Result<Image, ImageError> {
         radiance: rgb(list, "").ok_or_else(unsupported)?,
         standard_error: rgb(list, "stderr."),
         mask: plane(list, "mask"),
+        layers: LayerKind::ALL.into_iter().filter_map(|kind| further(list, kind)).collect(),
         metadata: metadata(&layer.attributes.other),
     })
 }
 
 fn channels(image: &Image) -> Result<Vec<Channel>, ImageError> {
-    let pixels = image.width * image.height;
-    let check = |layer, found| {
-        let (width, height) = (image.width, image.height);
-        if found == pixels { Ok(()) } else { Err(ImageError::Layer { layer, width, height, found }) }
-    };
-    check("radiance", image.radiance.len())?;
+    image.check_layers()?;
     let samples = |values: Vec<f32>| ex::FlatSamples::F32(values);
     let mut channels = Vec::new();
     let mut add = |prefix: &str, values: &[[f64; 3]]| {
@@ -90,14 +87,23 @@ fn channels(image: &Image) -> Result<Vec<Channel>, ImageError> {
     };
     add("", &image.radiance);
     if let Some(error) = &image.standard_error {
-        check("stderr", error.len())?;
         add("stderr.", error);
     }
     if let Some(mask) = &image.mask {
-        check("mask", mask.len())?;
         channels.push(Channel::new("mask", samples(mask.iter().map(|m| *m as f32).collect())));
     }
+    for layer in &image.layers {
+        for (name, plane) in layer.kind.channels().iter().zip(&layer.planes) {
+            channels.push(Channel::new(*name, samples(plane.iter().map(|v| *v as f32).collect())));
+        }
+    }
     Ok(channels)
+}
+
+/// A layer of its kind, where all its channels are there.
+fn further(list: &[Channel], kind: LayerKind) -> Option<Layer> {
+    let planes = kind.channels().iter().map(|name| plane(list, name)).collect::<Option<Vec<_>>>()?;
+    Some(Layer { kind, planes })
 }
 
 /// Name of the attribute that tells how the picture came about, as a JSON object.
@@ -131,6 +137,11 @@ fn rgb(list: &[Channel], prefix: &str) -> Option<Vec<[f64; 3]>> {
 mod tests {
     use super::*;
 
+    fn layer(kind: LayerKind) -> Layer {
+        let plane = |c: usize| (0..12).map(|i| (i * 8 + c) as f64 * 0.5).collect();
+        Layer { kind, planes: (0..kind.channels().len()).map(plane).collect() }
+    }
+
     fn example() -> Image {
         let values = |k: usize| (0..12).map(|i| std::array::from_fn(|c| 0.25 * (i * 3 + c + k) as f64)).collect();
         Image {
@@ -145,7 +156,9 @@ mod tests {
                 samples: Some(64),
                 seconds: Some(0.1),
                 program: Some("goniofit 0.1.0".into()),
+                plan: None,
             },
+            layers: LayerKind::ALL.map(layer).to_vec(),
         }
     }
 
@@ -154,7 +167,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
         let full = example();
-        let bare = Image { standard_error: None, mask: None, metadata: Metadata::default(), ..full.clone() };
+        let bare = Image {
+            standard_error: None,
+            mask: None,
+            layers: Vec::new(),
+            metadata: Metadata::default(),
+            ..full.clone()
+        };
         for image in [full, bare] {
             std::fs::write(&path, encode_exr(&image).unwrap()).unwrap();
             assert_eq!(read_exr(&path).unwrap(), image);
@@ -172,6 +191,17 @@ mod tests {
         let back = read_exr(&path).unwrap();
         assert!(back.radiance[0].iter().zip(&image.radiance[0]).all(|(a, b)| a.to_bits() == b.to_bits()));
         assert!(back.radiance[1][0].is_nan());
+    }
+
+    #[test]
+    fn missing_channels_are_named() {
+        let plane = |name: &str| Channel::new(name, ex::FlatSamples::F32(vec![0.0; 4]));
+        let list = ex::AnyChannels::sort(["G", "R", "depth.Z"].map(plane).into_iter().collect());
+        let layer = ex::Layer::new((2, 2), ex::LayerAttributes::default(), ex::Encoding::default(), list);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        ex::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+        let error = decode_exr(Path::new("a.exr"), bytes.into_inner()).unwrap_err().to_string();
+        assert_eq!(error, "a.exr: expected channels R, G, B, or Y alone, found channels G, R, depth.Z");
     }
 
     #[test]

@@ -4,21 +4,34 @@
 //! the numbers in which two pictures differ. The one decision to know: numbers are always taken from linear radiance;
 //! 8-bit pictures are only for eyes.
 
+mod appearance;
 mod bitmap;
+mod blocks;
+mod color;
 mod colormap;
 mod compare;
+mod delta_e;
 mod error;
 mod exr_file;
+mod filter;
+mod flip;
+mod hdr_flip;
+mod layers;
+mod maps;
 pub mod sheet;
 mod significance;
+mod ssim;
 mod tone;
 
+pub use appearance::{Appearance, MeanAndMax, appearance, flip_map};
 pub use bitmap::{Bitmap, encode_png};
 pub use colormap::{ColorMap, DifferenceMap, difference_map, difference_range};
-pub use compare::{Comparison, compare};
+pub use compare::{Comparison, NotFinite, compare, compare_at};
 pub use error::ImageError;
 pub use exr_file::{decode_exr, encode_exr, read_exr};
-pub use significance::Significance;
+pub use layers::{Layer, LayerKind};
+pub use maps::{comparison_sheet, difference, map_tiles};
+pub use significance::{BlockTest, Significance};
 pub use tone::{develop, exposure_for, srgb_encode};
 
 /// A pixel of whose light a larger share is unknown is masked. The share is an expected value, so more samples find it more
@@ -39,6 +52,8 @@ pub struct Image {
     /// Expected share of the pixel's light that nobody measured, 0 to 1, where anything can be; one value a pixel. Above
     /// [`MASKED_SHARE`] the pixel is masked: it takes part in no comparison.
     pub mask: Option<Vec<f64>>,
+    /// What else is known of the pixels; at most one of a kind.
+    pub layers: Vec<Layer>,
     /// How the picture came about.
     pub metadata: Metadata,
 }
@@ -57,4 +72,7 @@ pub struct Metadata {
     pub seconds: Option<f64>,
     /// Program and version.
     pub program: Option<String>,
+    /// In one line, what was computed: how long paths are, how lights are found, which layers were gathered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plan: Option<String>,
 }

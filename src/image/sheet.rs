@@ -29,6 +29,15 @@ pub struct Tile {
     pub scale: Option<Scale>,
 }
 
+impl Tile {
+    /// A tile without a scale. A small picture is enlarged by a whole factor, so that labels have room.
+    #[must_use]
+    pub fn enlarged(picture: Bitmap, label: &str, caption: String) -> Self {
+        let factor = 320usize.div_ceil(picture.width.max(1));
+        Self { picture: picture.enlarged(factor), label: label.into(), caption, scale: None }
+    }
+}
+
 /// A colour scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {

@@ -3,10 +3,17 @@
 use serde::Serialize;
 
 use super::Image;
-use crate::numeric::stats::{sidak, two_sided_p};
+use super::blocks::Level;
+use crate::numeric::stats::{normal_quantile, sidak, two_sided_p};
 
 /// Samples a pixel below which its standard error says too little of its noise.
 const MIN_SAMPLES: u32 = 16;
+
+/// Probability that a family of tests flags two pictures that differ by nothing but noise.
+const LEVEL: f64 = 0.01;
+
+/// Edge of the blocks of [`BlockTest`], pixels.
+const BLOCK: usize = 32;
 
 /// A test of every pixel, every block of 2 × 2, 4 × 4, … pixels and the whole picture, channel by channel: differences too small
 /// to be seen in a pixel add up in a block.
@@ -39,6 +46,58 @@ pub struct Significance {
     pub mean_z2: f64,
     /// Whether the pictures differ significantly, at 1 %.
     pub differs: bool,
+    /// Pixels of which some channel was tested.
+    pub pixels: usize,
+    /// Those of them that differ by more than their noise at 1 % for all single pixels × channels together (Šidák).
+    pub pixels_differing: usize,
+    /// The test of the means over blocks of 32 × 32 pixels alone.
+    pub blocks: BlockTest,
+}
+
+/// The test of the means over blocks of 32 × 32 pixels, channel by channel: it sees a bias far below the noise of a pixel, and with
+/// fewer tests than over all sizes of blocks a smaller one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BlockTest {
+    /// Width and height of a block, pixels: 32, or as much more than the picture's larger side as makes a power of two.
+    pub block: usize,
+    /// Number of tests: blocks × channels.
+    pub tests: usize,
+    /// Largest |z|.
+    pub max_z: f64,
+    /// Column and row of the upper left pixel of that block, and the channel.
+    pub at: (usize, usize, usize),
+    /// Mean of x − ref over that block, W/(sr·m²).
+    pub difference: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Probability that the largest of as many independent |z| is this large by chance (Šidák).
+    pub p: f64,
+    /// Whether some block differs significantly, at 1 % for all blocks together.
+    pub differs: bool,
+}
+
+impl BlockTest {
+    fn of(level: &Level) -> Self {
+        let found = level.outcome();
+        let (p, differs) = judged(found.max_z, found.tests);
+        let (difference, standard_error) = found.difference;
+        Self {
+            block: level.block,
+            tests: found.tests,
+            max_z: found.max_z,
+            at: found.at,
+            difference,
+            standard_error,
+            p,
+            differs,
+        }
+    }
+}
+
+/// The probability that the largest of as many independent |z| is this large by chance, and whether that is below [`LEVEL`].
+fn judged(max_z: f64, tests: usize) -> (f64, bool) {
+    let p = two_sided_p(max_z);
+    (-f64::exp_m1(tests as f64 * f64::ln_1p(-p)), p.is_nan() || p < sidak(LEVEL, tests))
 }
 
 /// Tests two pictures of one size where both are `known`, or says why they can't be tested.
@@ -60,166 +119,42 @@ pub(super) fn significance(image: &Image, reference: &Image, known: &[bool]) -> 
         return Err("no pixel has a known noise".into());
     }
     let mut all = pixels.clone();
+    let (tested, differing) = level.beyond(-normal_quantile(0.5 * sidak(LEVEL, pixels.tests)));
+    let mut blocks = BlockTest::of(&level);
     while level.width * level.height > 1 {
         level = level.halved();
         all.join(&level.outcome());
+        if level.block <= BLOCK {
+            blocks = BlockTest::of(&level);
+        }
     }
-    let p = two_sided_p(all.max_z);
+    let (p, differs) = judged(all.max_z, all.tests);
     Ok(Significance {
         tests: all.tests,
         max_z: all.max_z,
         at: all.at,
         block: all.block,
-        p: -f64::exp_m1(all.tests as f64 * f64::ln_1p(-p)),
+        p,
         mean_z2: pixels.squares / pixels.tests as f64,
-        differs: p.is_nan() || p < sidak(0.01, all.tests),
+        differs,
+        pixels: tested,
+        pixels_differing: differing,
+        blocks,
     })
 }
 
-/// The picture in blocks of one size.
-struct Level {
-    width: usize,
-    height: usize,
-    /// Edge of a block, pixels.
-    block: usize,
-    cells: Vec<[Cell; 3]>,
-}
-
-impl Level {
-    fn pixels(image: &Image, reference: &Image, known: &[bool]) -> Self {
-        let freedom = |p: &Image| p.metadata.samples.map_or(f64::INFINITY, |n| f64::from(n) - 1.0);
-        let (freedom, reference_freedom) = (freedom(image), freedom(reference));
-        let (noise, reference_noise) = (pooled_variance(image, known), pooled_variance(reference, known));
-        let cell = |i: usize, c: usize| {
-            let (x, r) = (image.radiance[i][c], reference.radiance[i][c]);
-            let (v, w) = (noise[i][c], reference_noise[i][c]);
-            let agree = (x - r).abs() == 0.0 && v + w == 0.0;
-            if !known[i] || agree || v + w == f64::INFINITY {
-                return Cell::default();
-            }
-            let rounding = 0.5 * f64::from(f32::EPSILON) * x.abs().max(r.abs());
-            let spread = v * v / freedom + w * w / reference_freedom;
-            Cell { tested: true, difference: x - r, variance: v + w + rounding * rounding, spread }
-        };
-        let cells = (0..known.len()).map(|i| [cell(i, 0), cell(i, 1), cell(i, 2)]).collect();
-        Self { width: image.width, height: image.height, block: 1, cells }
-    }
-
-    /// The picture in blocks of twice the edge.
-    fn halved(&self) -> Self {
-        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
-        let mut cells = vec![[Cell::default(); 3]; width * height];
-        for (i, from) in self.cells.iter().enumerate() {
-            let (x, y) = (i % self.width, i / self.width);
-            let into = &mut cells[y / 2 * width + x / 2];
-            (0..3).for_each(|c| into[c].add(&from[c]));
-        }
-        Self { width, height, block: 2 * self.block, cells }
-    }
-
-    fn outcome(&self) -> Outcome {
-        let mut outcome = Outcome { block: self.block, ..Outcome::default() };
-        for (i, cell) in self.cells.iter().enumerate() {
-            for (c, cell) in cell.iter().enumerate().filter(|(_, cell)| cell.tested) {
-                let z = cell.z();
-                outcome.tests += 1;
-                outcome.squares += z * z;
-                if exceeds(z, outcome.max_z) {
-                    let (column, row) = (i % self.width, i / self.width);
-                    (outcome.max_z, outcome.at) = (z, (self.block * column, self.block * row, c));
-                }
-            }
-        }
-        outcome
-    }
-}
-
-/// What the tests of one level, or of several, found.
-#[derive(Debug, Clone, Default)]
-struct Outcome {
-    tests: usize,
-    max_z: f64,
-    at: (usize, usize, usize),
-    block: usize,
-    squares: f64,
-}
-
-impl Outcome {
-    fn join(&mut self, other: &Self) {
-        self.tests += other.tests;
-        if exceeds(other.max_z, self.max_z) {
-            (self.max_z, self.at, self.block) = (other.max_z, other.at, other.block);
-        }
-    }
-}
-
-/// Whether z is above the largest so far; the first NaN is above everything.
-fn exceeds(z: f64, largest: f64) -> bool {
-    z > largest || (z.is_nan() && !largest.is_nan())
-}
-
-/// Sums over a block.
-#[derive(Debug, Clone, Copy, Default)]
-struct Cell {
-    tested: bool,
-    /// Σ (x − ref).
-    difference: f64,
-    /// Σ (σ² + σref²).
-    variance: f64,
-    /// Σ σ⁴/(samples − 1) of both pictures.
-    spread: f64,
-}
-
-impl Cell {
-    fn add(&mut self, other: &Self) {
-        self.tested |= other.tested;
-        self.difference += other.difference;
-        self.variance += other.variance;
-        self.spread += other.spread;
-    }
-
-    fn z(&self) -> f64 {
-        if self.difference == 0.0 {
-            return 0.0;
-        }
-        let t = self.difference.abs() / self.variance.sqrt();
-        if self.spread > 0.0 { normal_of_student(t, self.variance * self.variance / self.spread) } else { t }
-    }
-}
-
-/// The normal variate as improbable as Student's t ≥ 0 with `freedom` degrees of freedom, to 1 % from 15 degrees on up to z = 6
-/// (Wallace 1959): z = (8ν + 1)/(8ν + 3)·√(ν ln(1 + t²/ν)).
-fn normal_of_student(t: f64, freedom: f64) -> f64 {
-    (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * (freedom * (t * t / freedom).ln_1p()).sqrt()
-}
-
-/// Variance of every pixel: the larger of its own and the mean over the 3 × 3 known pixels about it, without those whose variance
-/// is not finite; 0 for an exact picture. NaN stays NaN.
-fn pooled_variance(image: &Image, known: &[bool]) -> Vec<[f64; 3]> {
-    let Some(errors) = &image.standard_error else { return vec![[0.0; 3]; known.len()] };
-    let near = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
-    let pooled = |i: usize| {
-        let (mut sum, mut count) = ([0.0; 3], [0.0; 3]);
-        for y in near(i / image.width, image.height) {
-            for k in near(i % image.width, image.width).map(|x| y * image.width + x).filter(|k| known[*k]) {
-                for c in (0..3).filter(|c| errors[k][*c].is_finite()) {
-                    sum[c] += errors[k][c] * errors[k][c];
-                    count[c] += 1.0;
-                }
-            }
-        }
-        [0, 1, 2].map(|c| {
-            let own = errors[i][c] * errors[i][c];
-            if own.is_nan() || count[c] == 0.0 { own } else { own.max(sum[c] / count[c]) }
-        })
-    };
-    (0..errors.len()).map(pooled).collect()
+/// The difference of every pixel in units of its noise, with its sign: that of the channel where it is largest. `None` for a pixel
+/// that is not tested; nothing where pictures can't be tested, or a value is not a number.
+pub(super) fn z_map(image: &Image, reference: &Image, known: &[bool]) -> Option<Vec<Option<f64>>> {
+    significance(image, reference, known).ok().filter(|s| s.max_z.is_finite())?;
+    Some(Level::pixels(image, reference, known).signed())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::image::Metadata;
+    use crate::image::blocks::normal_of_student;
     use crate::numeric::random::{Purpose, stream};
     use crate::numeric::stats::{normal_quantile, student_quantile};
     use rand_distr::{Distribution, StandardNormal};
@@ -262,6 +197,31 @@ mod tests {
         let s = test(&image, &picture(64, 64, None, |_| 1.0)).unwrap();
         // 0.6 σ in 16 × 16 pixels: 9.6 ± 1 there.
         assert!(s.differs && s.block == 16 && (s.at.0, s.at.1) == (32, 16) && (s.max_z - 9.6).abs() < 4.0, "{s:?}");
+    }
+
+    #[test]
+    fn block_means_see_a_bias_that_no_pixel_shows() {
+        let noise = noise(3 * 128 * 128);
+        let biased = |bias: f64| {
+            let errors = Some(vec![[0.01; 3]; 128 * 128]);
+            Image { standard_error: errors, ..picture(128, 128, None, |i| 1.0 + bias + 0.01 * noise[i]) }
+        };
+        let exact = picture(128, 128, None, |_| 1.0);
+        let none = test(&biased(0.0), &exact).unwrap();
+        assert!(!none.blocks.differs && none.pixels_differing == 0 && none.pixels == 128 * 128, "{none:?}");
+        // 0.2 σ of a pixel is 6.4 σ of a block of 32 × 32.
+        let s = test(&biased(0.002), &exact).unwrap();
+        assert!(s.blocks.differs && s.pixels_differing == 0 && s.blocks.tests == 3 * 16, "{s:?}");
+        assert!((s.blocks.difference - 0.002).abs() < 5.0 * s.blocks.standard_error, "{s:?}");
+        assert!((s.blocks.standard_error / (0.01 / 32.0) - 1.0).abs() < 1e-6 && s.blocks.block == 32, "{s:?}");
+    }
+
+    #[test]
+    fn pixels_beyond_their_noise_are_counted() {
+        let mut image = picture(6, 1, None, |i| if i == 4 || i == 6 { 2.0 } else { 1.0 });
+        image.standard_error = Some(vec![[0.1; 3]; 6]);
+        let s = test(&image, &picture(6, 1, None, |_| 1.0)).unwrap();
+        assert_eq!((s.pixels, s.pixels_differing, s.blocks.block), (6, 2, 8));
     }
 
     #[test]

@@ -7,19 +7,20 @@ use rayon::prelude::*;
 
 use super::RenderError;
 use super::camera::Camera;
-use super::integrator::{PathResult, Strategy, Tracer};
+use super::integrator::{PathResult, Strategy, Tracer, Watch};
+use super::layers::{Gathered, LayerSet, Sight, layer};
 use super::packet::{FlatScene, Found, Packets, Plan};
+use super::pixel::Pixel;
 use super::scene::{Scene, SceneSpec};
 use crate::control::Control;
 use crate::image::{Image, Metadata};
-use crate::numeric::float::sqrt_nonneg;
-use crate::numeric::random::{Purpose, RngExt, Stream, stream};
+use crate::numeric::random::RngExt;
 use crate::numeric::simd::LANES;
 
 /// Samples of a pixel in one pass at most.
 const PASS: u32 = 32;
 
-/// Pixels of a picture at most: 8192 × 8192, which takes about 12 GB with all its layers.
+/// Pixels of a picture at most: 8192 × 8192, which takes about 12 GB, and with all of [`LayerSet::NAMED`] about 2.5 times that.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// What to render.
@@ -35,11 +36,14 @@ pub struct Options {
     pub seed: u64,
     /// How lights are found.
     pub strategy: Strategy,
+    /// Layers to gather beside the radiance; none by default, which takes no time.
+    pub layers: LayerSet,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { width: 512, height: 512, samples: 64, seed: 0, strategy: Strategy::default() }
+        let (strategy, layers) = (Strategy::default(), LayerSet::default());
+        Self { width: 512, height: 512, samples: 64, seed: 0, strategy, layers }
     }
 }
 
@@ -73,51 +77,6 @@ impl Options {
     }
 }
 
-/// What one pixel has gathered. Sums are taken about the first sample, so that the variance of nearly equal samples, or of
-/// samples of 10²⁰, keeps its digits.
-#[derive(Debug, Clone)]
-struct Pixel {
-    rng: Stream,
-    samples: u32,
-    unknown: f64,
-    first: DVec3,
-    sum: DVec3,
-    squares: DVec3,
-}
-
-impl Pixel {
-    fn new(seed: u64, index: u64) -> Self {
-        let rng = stream(seed, Purpose::Pixel, index);
-        Self { rng, samples: 0, unknown: 0.0, first: DVec3::ZERO, sum: DVec3::ZERO, squares: DVec3::ZERO }
-    }
-
-    fn add(&mut self, path: &PathResult) {
-        if self.samples == 0 {
-            self.first = path.radiance;
-        }
-        let d = path.radiance - self.first;
-        self.sum += d;
-        self.squares += d * d;
-        self.samples += 1;
-        self.unknown += path.unknown;
-    }
-
-    fn mean(&self) -> DVec3 {
-        if self.samples == 0 { DVec3::ZERO } else { self.first + self.sum / f64::from(self.samples) }
-    }
-
-    fn standard_error(&self) -> DVec3 {
-        let n = f64::from(self.samples);
-        if n < 2.0 {
-            return DVec3::INFINITY;
-        }
-        let mean = self.sum / n;
-        let variance = (self.squares - n * mean * mean) / (n - 1.0);
-        // Round-off of the squares can reach below 0; NaN stays NaN.
-        DVec3::from_array(variance.to_array().map(|v| sqrt_nonneg(v.clamp(0.0, f64::INFINITY) / n)))
-    }
-}
-
 /// A rendered picture: per pixel and channel the mean of its samples and its standard error. Row 0 is on top.
 #[derive(Debug, Clone)]
 pub struct Film {
@@ -130,8 +89,12 @@ pub struct Film {
     /// Samples that were not finite; each of them leaves its pixel not finite. Always 0 but for a mistake of the program.
     pub not_finite: u64,
     scene: String,
+    plan: String,
     seed: u64,
     pixels: Vec<Pixel>,
+    layers: LayerSet,
+    /// One for each pixel where there are layers, else none.
+    gathered: Vec<Gathered>,
 }
 
 impl Film {
@@ -179,7 +142,9 @@ impl Film {
                 samples: Some(self.samples()),
                 seconds: Some(self.seconds),
                 program: Some(format!("goniofit {}", env!("CARGO_PKG_VERSION"))),
+                plan: Some(self.plan.clone()),
             },
+            layers: self.layers.kinds().filter_map(|kind| layer(kind, &self.gathered)).collect(),
         }
     }
 
@@ -202,6 +167,11 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     let width = options.width as usize;
     let count = u64::from(options.width) * u64::from(options.height);
     let mut pixels = reserved(options, count as usize)?;
+    let mut gathered = Vec::new();
+    if !options.layers.is_empty() {
+        gathered = reserved(options, count as usize)?;
+        gathered.resize(count as usize, Gathered::default());
+    }
     (0..count as usize).into_par_iter().map(|i| Pixel::new(options.seed, i as u64)).collect_into_vec(&mut pixels);
     let mut film = Film {
         width: options.width,
@@ -209,8 +179,11 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         seconds: 0.0,
         not_finite: 0,
         scene: scene.name.clone(),
+        plan: plan(scene, options),
         seed: options.seed,
         pixels,
+        layers: options.layers,
+        gathered,
     };
     let camera = Camera::new(&scene.camera, scene.origin, options.width, options.height);
     let tracer = Tracer::new(scene, options.strategy);
@@ -221,14 +194,19 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     while done < options.samples && !control.stop.requested() {
         let least = if packets.is_some() { LANES as u32 } else { 1 };
         let pass = done.clamp(least, PASS).min(options.samples - done);
-        let rows = film.pixels.par_chunks_mut(width).enumerate();
-        let bad = rows.map(|(y, row)| {
+        let mut gathered: Vec<_> = film.gathered.chunks_mut(width).map(Some).collect();
+        gathered.resize_with(options.height as usize, || None);
+        let rows = film.pixels.par_chunks_mut(width).zip(gathered).enumerate();
+        let bad = rows.map(|(y, (row, gathered))| {
             if control.stop.requested() {
                 return 0;
             }
-            let bad = match &packets {
-                Some(packets) => packet_row(packets, y, row, (done, pass)),
-                None => render_row(&tracer, &camera, y, row, pass),
+            let bad = match (gathered, &packets) {
+                (None, Some(packets)) => packet_row(packets, y, row, (done, pass)),
+                (None, None) => render_row(&tracer, &camera, y, row, pass, |_, (): &(), _| {}),
+                (Some(g), _) => {
+                    render_row(&tracer, &camera, y, row, pass, |x, sight: &Sight, path| g[x].add(sight, path.radiance))
+                }
             };
             control.progress.advance(u64::from(pass));
             bad
@@ -242,27 +220,48 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
 }
 
 /// Room for `count` pixels: a picture that does not fit into memory is an error, not the end of the program.
-fn reserved(options: &Options, count: usize) -> Result<Vec<Pixel>, RenderError> {
+fn reserved<T>(options: &Options, count: usize) -> Result<Vec<T>, RenderError> {
     let mut pixels = Vec::new();
     let refused = |_| {
-        let bytes = count as f64 * size_of::<Pixel>() as f64;
+        let bytes = count as f64 * size_of::<T>() as f64;
         RenderError::Memory { width: options.width, height: options.height, gigabytes: bytes * 1e-9 }
     };
     pixels.try_reserve_exact(count).map_err(refused)?;
     Ok(pixels)
 }
 
-/// Adds `samples` paths to every pixel of a row; the number of those that were not finite.
-fn render_row(tracer: &Tracer<'_>, camera: &Camera, y: usize, row: &mut [Pixel], samples: u32) -> u64 {
+/// In one line, what is computed.
+fn plan(scene: &Scene, options: &Options) -> String {
+    let lights = match options.strategy {
+        Strategy::Combined => "lights sampled by position and by material",
+        Strategy::MaterialOnly => "lights sampled by material",
+        Strategy::LightsOnly => "lights sampled by position",
+    };
+    let layers = if options.layers.is_empty() { "none".into() } else { options.layers.names() };
+    format!("paths of at most {} scattering events, {lights}; further layers: {layers}", scene.max_bounces)
+}
+
+/// Adds `samples` paths to every pixel of a row, and tells `gather` of each, with its column and what was watched; the number of
+/// those that were not finite.
+fn render_row<W: Watch + Default>(
+    tracer: &Tracer<'_>,
+    camera: &Camera,
+    y: usize,
+    row: &mut [Pixel],
+    samples: u32,
+    mut gather: impl FnMut(usize, &W, &PathResult),
+) -> u64 {
     let mut bad = 0;
     for (x, pixel) in row.iter_mut().enumerate() {
         for _ in 0..samples {
             let jitter = DVec2::new(pixel.rng.random(), pixel.rng.random());
             let ray = camera.ray(DVec2::new(x as f64, y as f64) + jitter);
-            let path = tracer.trace(ray, &mut pixel.rng);
+            let mut watch = W::default();
+            let path = tracer.trace(ray, &mut pixel.rng, &mut watch);
             debug_assert!(path.radiance.is_finite(), "pixel ({x}, {y}): radiance {}", path.radiance);
             bad += u64::from(!path.radiance.is_finite());
             pixel.add(&path);
+            gather(x, &watch, &path);
         }
     }
     bad
@@ -304,7 +303,7 @@ mod tests {
 
     #[test]
     fn memory_that_is_not_there_is_an_error() {
-        let error = reserved(&Options::default(), usize::MAX / 2).expect_err("more than there is");
+        let error = reserved::<Pixel>(&Options::default(), usize::MAX / 2).expect_err("more than there is");
         assert!(matches!(error, RenderError::Memory { width: 512, height: 512, .. }), "{error}");
     }
 }

@@ -53,6 +53,19 @@ pub struct PathResult {
     pub unknown: f64,
 }
 
+/// What somebody may want to know of a path beside its radiance. `()` wants nothing, and costs nothing.
+pub trait Watch {
+    /// The first surface that the path meets, seen from `eye`, and its material, if it is no light. `rng` is the path's stream.
+    fn first_surface(&mut self, eye: DVec3, surface: &Surface, material: Option<&Material>, rng: &Stream);
+    /// From here on light has scattered twice or more; `so_far` is the radiance of the light that has not.
+    fn indirect_begins(&mut self, so_far: DVec3);
+}
+
+impl Watch for () {
+    fn first_surface(&mut self, _: DVec3, _: &Surface, _: Option<&Material>, _: &Stream) {}
+    fn indirect_begins(&mut self, _: DVec3) {}
+}
+
 /// Where and how the path scattered last.
 #[derive(Debug, Clone, Copy)]
 struct Scatter {
@@ -99,7 +112,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Follows one path that starts with `ray` at the camera.
-    pub fn trace(&self, mut ray: Ray, rng: &mut Stream) -> PathResult {
+    pub fn trace(&self, mut ray: Ray, rng: &mut Stream, watch: &mut impl Watch) -> PathResult {
         let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: 0.0 };
         let mut last: Option<Scatter> = None;
         for bounce in 0..=self.scene.max_bounces {
@@ -107,6 +120,9 @@ impl<'a> Tracer<'a> {
                 path.radiance += path.throughput * self.environment_found(&ray, last.as_ref());
                 break;
             };
+            if bounce == 0 {
+                watch.first_surface(ray.origin, &surface, self.material_of(&surface), rng);
+            }
             if surface.point.normal.dot(ray.direction) >= 0.0 {
                 break; // the back of anything is black
             }
@@ -124,11 +140,22 @@ impl<'a> Tracer<'a> {
             if vertex.wo.z <= 0.0 {
                 break;
             }
+            if bounce == 1 {
+                // What the lights send to the second surface will have scattered there and at the first.
+                watch.indirect_begins(path.radiance);
+            }
             let Some(next) = self.scatter(material, &vertex, bounce, &mut path, rng) else { break };
             ray = Ray::new(vertex.point.above(), next.0);
             last = Some(next.1);
         }
         PathResult { radiance: path.radiance, unknown: path.unknown }
+    }
+
+    fn material_of(&self, surface: &Surface) -> Option<&'a Material> {
+        match surface.owner {
+            Owner::Light(_) => None,
+            Owner::Material(material) => Some(&self.scene.materials[material]),
+        }
     }
 
     /// Adds the light that arrives at the vertex directly and draws where the path goes on; `None` where it ends.

@@ -23,6 +23,7 @@ fn the_demo_writes_every_file_and_its_numbers_can_be_read() {
     let b = Bench::new();
     let said = b.json(&["demo", "--size", "24", "--samples", "16", "--out", "d"]);
     let mut expected = vec!["measurement.csv", "numbers.json", "sheet.png", "lambert.json", "lambert+phong.json"];
+    expected.extend(["maps-lambert.png", "maps-lambert+phong.png"]);
     let pictures = ["truth", "lambert", "lambert+phong", "difference-lambert", "difference-lambert+phong"];
     let files: Vec<String> = pictures.iter().flat_map(|p| [format!("{p}.exr"), format!("{p}.png")]).collect();
     expected.extend(files.iter().map(String::as_str));
@@ -81,6 +82,7 @@ fn every_command_takes_what_the_one_before_it_wrote() {
         "difference-1.png",
         "fit-1.exr",
         "fit-1.png",
+        "maps-1.png",
         "numbers.json",
         "sheet.png",
         "table.exr",
@@ -91,6 +93,10 @@ fn every_command_takes_what_the_one_before_it_wrote() {
 
     let compared = b.json(&["compare", "v/fit-1.exr", "v/table.exr"]);
     let image = &validated["fits"][0]["image"];
+    let looks = &image["appearance"];
+    assert!(number(&looks["flip"]["mean"]) > 0.0 && number(&looks["delta_e_2000"]["max"]) > 0.0, "{looks}");
+    let statement = validated["fits"][0]["statement"].as_str().expect("a sentence");
+    assert!(statement.contains("too few samples") && statement.contains("largest difference"), "{statement}");
     assert_eq!(compared["pixels"], image["pixels"]);
     for key in ["rmse", "rel_mse", "max_abs"] {
         // Files hold 32-bit floats.

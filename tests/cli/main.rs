@@ -4,6 +4,7 @@
 mod adaptive;
 mod bench;
 mod chain;
+mod compare;
 mod effects;
 mod failures;
 mod fit_file;

@@ -4,7 +4,7 @@
 //! angle a, and a Lambert lobe is read as it is. Of a Phong lobe that depends on two numbers besides the
 //! exponent: the angle α between the mirror direction r and wo, and q = cosθi/cosθo. For the mean of cosⁿ∠(r′, w′) w′ over r′ about r and w′
 //! about wo lies in the plane of both, U(α) wo + W(α) r, and its z component over cosθo is U + q W. U and W with their derivatives by n are
-//! tabulated ([`seen`]); then a sample costs an interpolation, whatever the cones.
+//! tabulated (`seen`); then a sample costs an interpolation, whatever the cones.
 //!
 //! Limits: the lobe's own end at α = 90° is smeared by rules that do not follow it exactly, so broad lobes (n below 2) are off by up to 1e-3 of their
 //! peak within an aperture's radius of it; pairs whose cones reach below the horizon have no place.
