@@ -39,6 +39,11 @@ impl QuadLight {
         Self { quad, radiance, rectangle: (x.dot(y).abs() < 1e-12).then_some(edges) }
     }
 
+    /// Where it is.
+    pub fn quad(&self) -> Quad {
+        self.quad
+    }
+
     /// Light that arrives at a point from a point of the quad.
     pub fn sample(&self, at: &SurfacePoint, u: DVec2) -> Option<Arrival> {
         let to_centre = self.quad.center - at.position;

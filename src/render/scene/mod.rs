@@ -2,12 +2,17 @@
 
 mod build;
 mod builtin;
+mod icosphere;
+mod parts;
+mod sky;
 mod spec;
 mod validate;
+mod validate_lights;
 
 pub use build::Scene;
 pub use builtin::{BUILT_IN, BuiltIn, builtin};
 pub use spec::{
-    CameraSpec, DirectionalLightSpec, EnvironmentSpec, EquationSpec, FilmSpec, LightsSpec, MaterialSpec, MeshNormals,
-    MeshSpec, PhongLobeSpec, PlaneSpec, PointLightSpec, QuadLightSpec, QuadSpec, SceneSpec, SphereSpec,
+    BuiltInMesh, BuiltInSky, CameraSpec, DirectionalLightSpec, EnvironmentSpec, EquationSpec, FilmSpec, LightsSpec,
+    MaterialSpec, MeshLightSpec, MeshNormals, MeshSpec, PhongLobeSpec, PlacementSpec, PlaneSpec, PointLightSpec,
+    QuadLightSpec, QuadSpec, SceneSpec, SphereLightSpec, SphereSpec, SpotLightSpec,
 };
