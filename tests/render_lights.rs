@@ -267,3 +267,29 @@ fn scenes_lit_by_spheres_and_meshes_can_be_scaled_and_moved() {
         assert!(excess(got, want, 5.0 * (noise + other)) <= 1.0, "moved by {moved}: {got} vs {want} ± {noise}");
     }
 }
+
+#[test]
+fn a_lobe_of_exponent_1e6_mirrors_lights_larger_and_smaller_than_itself() {
+    // The light's disc of half-angle σ stands in the mirror direction: ∫ (n+2)/(2π)·cosⁿα dω = (n+2)/(n+1)·(1 − cosⁿ⁺¹σ), times cosθ.
+    let folder = tempfile::tempdir().expect("folder");
+    obj(folder.path(), "lamp.obj", &ball(60));
+    let (n, cos) = (1e6, f64::sqrt(0.5));
+    let camera = DVec3::new(-1.0, 1.0, 0.0);
+    for sigma in [1e-5, 1e-4, 1e-3, 3e-3, 0.1] {
+        let (center, radius) = (DVec3::new(cos, cos, 0.0) * 10.0, 10.0 * f64::sin(sigma));
+        let mesh = format!(
+            "[[light.mesh]]\nfile = \"lamp.obj\"\nradiance = [1, 1, 1]\nplace = {{ scale = {radius:?}, translate = {} }}\n",
+            toml(center)
+        );
+        let want =
+            (n + 2.0) / (n + 1.0) * -f64::exp_m1((n + 1.0) * f64::ln_1p(-2.0 * f64::sin(0.5 * sigma).powi(2))) * cos;
+        for (light, flat) in [(sphere_light(center, radius, 1.0), 1e-5), (mesh, 5e-3)] {
+            let head = spot_camera(camera, DVec3::ZERO, 1);
+            let text = format!("{head}[materials]\nm = {{ phong = [{{ ks = [1, 1, 1], n = 1e6 }}] }}\n{GROUND}{light}");
+            let (got, noise) = one_pixel(&build(folder.path(), &text), 10_000);
+            let bound = 5.0 * noise + DVec3::splat((flat + sigma * sigma + 1e-4) * want);
+            assert!(excess(got, DVec3::splat(want), bound) <= 1.0, "σ {sigma:e}: {got} ± {noise} vs {want}\n{light}");
+            assert!((noise / got).max_element() < 0.05, "σ {sigma:e}: noise {noise} of {got}\n{light}");
+        }
+    }
+}

@@ -311,7 +311,7 @@ fn a_bad_mesh_file_says_what_is_wrong() {
         ("a.ply", format!("{}0 0 0\n1 zero 0\n", head("3", 1)), "face", "line 11"),
         ("a.ply", format!("{}{points}3 0 1 2\n", head("3", 1)), "vertex", "no nx, ny and nz"),
         ("a.ply", format!("{}{points}", head("3", 0)), "face", "at least one face"),
-        ("a.ply", format!("{}nan 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", head("3", 1)), "face", "vertex 1"),
+        ("a.ply", format!("{}1e39 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", head("3", 1)), "face", "vertex 1"),
         ("a.ply", format!("{}{points}", head("999999999999", 1)), "face", "a.ply"),
         ("a.ply", "not a mesh\n".into(), "face", "line 1"),
         ("a.gltf", "{}".into(), "face", "a.gltf"),
