@@ -11,10 +11,13 @@ use common::{excess, mean, picture};
 use glam::{DVec3, Quat, Vec3};
 use goniofit::render::{Materials, RenderError, Scene, SceneSpec};
 
+/// Positions, normals and faces.
+type Soup = (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<[u32; 3]>);
+
 /// A bumpy patch of triangles with normals: coordinates that 32-bit floats hold.
-fn patch() -> (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<[u32; 3]>) {
+fn patch() -> Soup {
     let n = 12u32;
-    let height = |x: f32, z: f32| (0.2 * (3.0 * x).sin() * (4.0 * z).cos()).mul_add(1.0, 0.5);
+    let height = |x: f32, z: f32| 0.5 + 0.2 * (3.0 * x).sin() * (4.0 * z).cos();
     let (mut points, mut normals, mut faces) = (Vec::new(), Vec::new(), Vec::new());
     for j in 0..=n {
         for i in 0..=n {

@@ -3,6 +3,7 @@
 mod build;
 mod builtin;
 mod icosphere;
+mod light_spec;
 mod parts;
 mod sky;
 mod spec;
@@ -11,8 +12,11 @@ mod validate_lights;
 
 pub use build::Scene;
 pub use builtin::{BUILT_IN, BuiltIn, builtin};
+pub use light_spec::{
+    BuiltInSky, DirectionalLightSpec, EnvironmentSpec, LightsSpec, MeshLightSpec, PointLightSpec, QuadLightSpec,
+    SphereLightSpec, SpotLightSpec,
+};
 pub use spec::{
-    BuiltInMesh, BuiltInSky, CameraSpec, DirectionalLightSpec, EnvironmentSpec, EquationSpec, FilmSpec, LightsSpec,
-    MaterialSpec, MeshLightSpec, MeshNormals, MeshSpec, PhongLobeSpec, PlacementSpec, PlaneSpec, PointLightSpec,
-    QuadLightSpec, QuadSpec, SceneSpec, SphereLightSpec, SphereSpec, SpotLightSpec,
+    BuiltInMesh, CameraSpec, EquationSpec, FilmSpec, MaterialSpec, MeshNormals, MeshSpec, PhongLobeSpec, PlacementSpec,
+    PlaneSpec, QuadSpec, SceneSpec, SphereSpec,
 };

@@ -7,7 +7,8 @@ use glam::DVec3;
 use super::super::RenderError;
 use super::super::lights::{Environment, EnvironmentImage, Light, MeshLight, QuadLight, SphereLight, SpotLight};
 use super::super::shapes::{Geometry, Mesh, Owner, Placement, Plane, Quad, Sphere, read_mesh};
-use super::spec::{LightsSpec, MeshNormals, PlacementSpec, SceneSpec};
+use super::light_spec::LightsSpec;
+use super::spec::{MeshNormals, PlacementSpec, SceneSpec};
 
 /// The meshes of a scene as they were read, in the order of its description.
 pub(super) struct Files {

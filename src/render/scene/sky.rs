@@ -4,7 +4,7 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 
 use glam::DVec3;
 
-use super::spec::BuiltInSky;
+use super::light_spec::BuiltInSky;
 use crate::geometry::angles::angle_between;
 use crate::image::ColorGrid;
 

@@ -1,7 +1,7 @@
 //! The ranges of the lights' fields.
 
 use super::super::RenderError;
-use super::spec::{EnvironmentSpec, LightsSpec, SpotLightSpec};
+use super::light_spec::{EnvironmentSpec, LightsSpec, SpotLightSpec};
 use super::validate::Check;
 
 /// Checks every field of the lights.

@@ -58,7 +58,7 @@ impl LatLong {
         let row = (down as usize).min(self.height - 2);
         let y = (down - row as f64).clamp(0.0, 1.0);
         // Measured from the nearer pole, where the share of the sphere keeps its digits.
-        let (from, angle, mirrored) = self.from_pole(row, flat, d.y);
+        let (from, angle, mirrored) = self.nearer_pole(row, flat, d.y);
         let (low, high) = (self.cap[from], self.cap[from + 1]);
         let s = (((0.5 * angle).sin().powi(2) - low) / (high - low)).clamp(0.0, 1.0);
         Place { column, row, x, y, s: if mirrored { 1.0 - s } else { s } }
@@ -66,7 +66,7 @@ impl LatLong {
 
     /// The unit direction of the point with coordinates x and s in a cell.
     pub fn direction(&self, column: usize, row: usize, x: f64, s: f64) -> DVec3 {
-        let (from, _, mirrored) = self.from_pole(row, 0.0, 1.0);
+        let (from, _, mirrored) = self.nearer_pole(row, 0.0, 1.0);
         let s = if mirrored { 1.0 - s } else { s };
         let cap = self.cap[from] + s * (self.cap[from + 1] - self.cap[from]);
         let flat = 2.0 * (cap * (1.0 - cap)).sqrt();
@@ -76,7 +76,7 @@ impl LatLong {
     }
 
     /// Row counted from the nearer pole, the angle from it, and whether that is the lower one.
-    fn from_pole(&self, row: usize, flat: f64, up: f64) -> (usize, f64, bool) {
+    fn nearer_pole(&self, row: usize, flat: f64, up: f64) -> (usize, f64, bool) {
         if 2 * row + 1 < self.height {
             (row, flat.atan2(up), false)
         } else {
