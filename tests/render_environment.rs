@@ -181,3 +181,20 @@ fn pictures_of_radiance_1e_minus_20_and_1e20_scale() {
         assert!(excess(spread, scale * noise, 1e-6 * scale * noise) <= 1.0, "{scale:e}: {spread} vs {noise}");
     }
 }
+
+#[test]
+fn a_lobe_of_exponent_1e6_mirrors_a_small_sun() {
+    // The sun is even over more than the lobe's 10⁻³ rad round the mirror direction: the lobe shows its radiance times cosθ.
+    let folder = tempfile::tempdir().expect("folder");
+    let sky =
+        |i: usize, j: usize| if (i == 120 || i == 121) && (j == 64 || j == 65) { [1e5, 1.0, 1e-3] } else { [0.0; 3] };
+    write(folder.path(), 512, 257, sky);
+    let (phi, theta) = (2.0 * PI * 121.0 / 512.0, PI * 64.5 / 256.0);
+    let sun = DVec3::new(phi.sin() * theta.sin(), theta.cos(), -phi.cos() * theta.sin());
+    let camera = DVec3::new(-sun.x, sun.y, -sun.z);
+    let built = floor(folder.path(), camera, "phong = [{ ks = [1, 1, 1], n = 1e6 }]", "file = \"sky.exr\"");
+    let (got, noise) = one_pixel(&built, 10_000);
+    let want = theta.cos() * DVec3::new(1e5, 1.0, 1e-3);
+    assert!(excess(got, want, 5.0 * noise + 1e-3 * want) <= 1.0, "{got} ± {noise} vs {want}");
+    assert!((noise / got).max_element() < 0.01, "noise {noise} of {got}");
+}

@@ -293,3 +293,29 @@ fn a_lobe_of_exponent_1e6_mirrors_lights_larger_and_smaller_than_itself() {
         }
     }
 }
+
+#[test]
+fn phong_s_equation_sees_spheres_at_their_centre_spots_in_their_cone_and_no_meshes() {
+    let folder = tempfile::tempdir().expect("folder");
+    obj(folder.path(), "lamp.obj", &ball(6));
+    let of = |light: &str| {
+        let head = spot_camera(DVec3::new(0.3, 1.0, 0.2), DVec3::ZERO, 1);
+        let text = format!(
+            "{head}[materials.m.equation]\nambient = [0.1, 0.1, 0.1]\ndiffuse = [1, 1, 1]\nspecular = [0, 0, 0]\nalpha = 1\n{GROUND}{light}"
+        );
+        one_pixel(&build(folder.path(), &text), 2).0.x
+    };
+    let spot = |direction: &str| {
+        format!(
+            "[[light.spot]]\nposition = [3, 4, 0]\ndirection = {direction}\nintensity = [7, 7, 7]\ninner_deg = 5\nouter_deg = 10\n"
+        )
+    };
+    for (light, want) in [
+        (sphere_light(DVec3::new(3.0, 4.0, 0.0), 1.0, 9.0), 0.1 + 0.8),
+        (spot("[-3, -4, 0]"), 0.1 + 0.8),
+        (spot("[0, -1, 0]"), 0.1),
+        ("[[light.mesh]]\nfile = \"lamp.obj\"\nradiance = [1, 1, 1]\nplace = { translate = [0, 4, 0] }\n".into(), 0.1),
+    ] {
+        assert!((of(&light) - want).abs() < 1e-6, "{light}: {}", of(&light));
+    }
+}
