@@ -168,6 +168,26 @@ fn ply_and_gltf_hold_the_same_mesh_as_obj() {
 }
 
 #[test]
+fn gltf_buffers_may_be_in_the_file_or_beside_it() {
+    let folder = tempfile::tempdir().expect("folder");
+    let (points, normals, faces) = patch();
+    let whole = glb(&points, &normals, &faces, "");
+    std::fs::write(folder.path().join("whole.glb"), &whole).expect("written");
+    let json_length = u32::from_le_bytes([whole[12], whole[13], whole[14], whole[15]]) as usize;
+    let (json, data) = (String::from_utf8_lossy(&whole[20..20 + json_length]), &whole[28 + json_length..]);
+    std::fs::write(folder.path().join("data.bin"), data).expect("written");
+    let with = |uri: String| json.replace("\"buffers\":[{", &format!("\"buffers\":[{{\"uri\":\"{uri}\","));
+    std::fs::write(folder.path().join("beside.gltf"), with("data.bin".into())).expect("written");
+    let text = base64::Engine::encode(&base64::prelude::BASE64_STANDARD, data);
+    let inside = with(format!("data:application/octet-stream;base64,{text}"));
+    std::fs::write(folder.path().join("inside.gltf"), inside).expect("written");
+    let of =
+        |name: &str| radiance(&scene(folder.path(), &format!("file = \"{name}\"")).unwrap_or_else(|e| panic!("{e}")));
+    let want = of("whole.glb");
+    assert!(of("beside.gltf") == want && of("inside.gltf") == want);
+}
+
+#[test]
 fn gltf_nodes_place_their_meshes_and_mirrors_keep_their_fronts() {
     let folder = tempfile::tempdir().expect("folder");
     let (points, normals, faces) = patch();
@@ -324,7 +344,13 @@ fn a_bad_mesh_file_says_what_is_wrong() {
             "a.gltf",
             gltf(r#"{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAA"}"#),
             "face",
-            "save as .glb",
+            "should hold 36 bytes, found 3",
+        ),
+        (
+            "a.gltf",
+            gltf(r#"{"byteLength":36,"uri":"data:application/octet-stream;base64,A*"}"#),
+            "face",
+            "expected base64 after `data:`",
         ),
         ("a.stl", "solid".into(), "face", ".obj, .ply, .gltf or .glb"),
     ] {

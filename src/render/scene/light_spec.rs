@@ -46,7 +46,7 @@ pub struct DirectionalLightSpec {
     pub irradiance: [f64; 3],
 }
 
-/// A parallelogram as in [`QuadSpec`] whose front shines alike in all directions.
+/// A parallelogram as in [`QuadSpec`](super::QuadSpec) whose front shines alike in all directions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QuadLightSpec {

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use glam::{DMat3, DMat4, DVec3};
 use gltf::buffer::Source;
 use gltf::mesh::Mode;
@@ -13,7 +15,7 @@ use crate::render::RenderError;
 /// Nodes may be nested this deep; a file in which they go round in circles is deeper.
 const DEEPEST: usize = 256;
 
-/// The mesh in a glTF file. Its buffers are in the `.glb` itself or in files beside it.
+/// The mesh in a glTF file. Its buffers are in the file itself or in files beside it.
 pub fn read(path: &Path, bytes: &[u8], vertex_normals: bool) -> Result<Mesh, RenderError> {
     let gltf = Gltf::from_slice(bytes).map_err(|error| whole_file(path, error.to_string()))?;
     let buffers = buffers(path, &gltf)?;
@@ -38,8 +40,10 @@ fn buffers(path: &Path, gltf: &Gltf) -> Result<Vec<Vec<u8>>, RenderError> {
         let bytes = match buffer.source() {
             Source::Bin => gltf.blob.clone().unwrap_or_default(),
             Source::Uri(uri) if uri.starts_with("data:") => {
-                let message = "a buffer is written into the JSON (data:), which is not read; save as .glb instead";
-                return Err(whole_file(path, message.into()));
+                let text = uri.split_once(";base64,").map(|(_, text)| text);
+                let bytes = text.and_then(|text| BASE64_STANDARD.decode(text).ok());
+                let broken = || format!("buffer {}: expected base64 after `data:`", buffer.index());
+                bytes.ok_or_else(|| whole_file(path, broken()))?
             }
             Source::Uri(uri) => {
                 let file = folder.join(uri);
