@@ -112,7 +112,7 @@ fn a_closed_mesh_lets_no_ray_through() {
         let stretched: Vec<DVec3> = vertices.iter().map(|v| *v * stretch).collect();
         std::fs::write(folder.path().join("shell.obj"), obj(&stretched, &faces, center)).expect("written");
         let mut spec = mesh_scene(folder.path(), "furnace", "shell.obj", "face");
-        spec.lights.environment.iter_mut().for_each(|e| e.radiance = [1e20; 3]);
+        spec.lights.environment.iter_mut().for_each(|e| e.radiance = Some([1e20; 3]));
         for (i, target) in [DVec3::X, DVec3::Z, -DVec3::X, vertices[0], vertices[7]].into_iter().enumerate() {
             spec.camera.position = center.to_array();
             spec.camera.target = (center + target * stretch).to_array();

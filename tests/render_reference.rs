@@ -167,6 +167,18 @@ fn cornell_phong() {
 }
 
 #[test]
+fn mesh_env() {
+    check("S4.exr", &builtin("mesh-env").expect("built in"), 512, 3072.0);
+}
+
+#[test]
+fn a_sky_turned_by_three_degrees_is_found() {
+    let mut spec = builtin("mesh-env").expect("built in");
+    spec.lights.environment.as_mut().expect("a sky").rotate_deg = Some(3.0);
+    assert_ne!(agrees("S4.exr", &spec, 512, 3072.0), Some(true));
+}
+
+#[test]
 fn a_material_wrong_by_two_percent_is_found() {
     for (file, name, samples) in [("S1.exr", "sphere", 3072), ("S2.exr", "sphere-on-plane", 4096)] {
         let mut spec = builtin(name).expect("built in");

@@ -45,6 +45,16 @@ fn every_broken_scene_says_where_and_why() {
         ("plane-without-normal", "`plane[0].normal` is [0.0, 0.0, 0.0]"),
         ("no-pixels", "`film.resolution` is [0, 512]"),
         ("no-samples", "`film.samples` is 0"),
+        (
+            "environment-of-two-kinds",
+            "`light.environment` is 2 kinds of environment, but must be exactly one of `radiance`",
+        ),
+        ("environment-scale-negative", "`light.environment.scale` is -2.0, but must be a finite number of at least 0"),
+        ("spot-angles-swapped", "`light.spot[0].inner_deg` is 40.0, but must be from 0 to `outer_deg`"),
+        ("sphere-light-without-size", "`light.sphere[0].radius` is 0.0, but must be a finite number above 0"),
+        ("mesh-light-negative", "`light.mesh[0].radiance` is [1.0, -1.0, 1.0]"),
+        ("mesh-of-nothing", "`mesh[0]` is neither, but must be either a `file` or a `builtin`"),
+        ("instance-without-size", "`mesh[0].instance[0].scale` is 0.0, but must be a finite number above 0"),
     ];
     for (name, words) in expected {
         let path = folder.join(format!("{name}.toml"));

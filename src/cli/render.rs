@@ -100,7 +100,8 @@ impl PictureArgs {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
-    for (option, out) in [("--out", Some(&args.out)), ("--png", args.png.as_ref())] {
+    let outputs = [("--out", Some(&args.out)), ("--png", args.png.as_ref())];
+    for (option, out) in outputs {
         let inputs = [args.file.as_deref(), args.material.as_deref().map(Path::new)];
         out.map_or(Ok(()), |out| keeps_inputs(option, out, inputs.into_iter().flatten()))?;
     }
@@ -108,6 +109,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         Some(path) => read_stage(path)?,
         None => args.picture.stage()?,
     };
+    let files: Vec<PathBuf> = stage.spec.files().map(|file| stage.base.join(file)).collect();
+    for (option, out) in outputs {
+        out.map_or(Ok(()), |out| keeps_inputs(option, out, files.iter().map(PathBuf::as_path)))?;
+    }
     check_extension(&args.out, "exr", "--out")?;
     check_folder(&args.out)?;
     stdout_is_free(&args.out, ui)?;

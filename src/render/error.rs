@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::image::ImageError;
+
 /// Why a scene could not be read, built or rendered.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -48,6 +50,19 @@ pub enum RenderError {
         /// What is wrong.
         message: String,
     },
+    /// The picture of an environment can't be used.
+    #[error("{path}{place}: {message}", path = path.display())]
+    Environment {
+        /// The file, or the name of a built-in environment.
+        path: PathBuf,
+        /// Where, such as `, column 3, row 7, red`; empty where it concerns the file as a whole.
+        place: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// A picture can't be read.
+    #[error(transparent)]
+    Image(#[from] ImageError),
     /// A material can't be used by the tracer.
     #[error("{origin}: material `{name}`: {reason}")]
     Material {

@@ -1,7 +1,5 @@
 //! The path tracer: radiance along a ray as the expected value of one random path.
 
-use std::f64::consts::FRAC_1_PI;
-
 use glam::{DVec2, DVec3};
 
 use super::material::{Material, PhongEquation, eval_rgb};
@@ -9,7 +7,7 @@ use super::ray::{Ray, SurfacePoint};
 use super::scene::Scene;
 use super::shapes::{Owner, Surface};
 use crate::brdf::Brdf;
-use crate::geometry::{Frame, sampling};
+use crate::geometry::Frame;
 use crate::numeric::random::{RngExt, Stream};
 
 /// Scattering events before paths may end by chance.
@@ -127,8 +125,9 @@ impl<'a> Tracer<'a> {
                 break; // the back of anything is black
             }
             let material = match surface.owner {
-                Owner::Light(light) => {
-                    path.radiance += path.throughput * self.light_found(light, &surface, last.as_ref());
+                Owner::Light { light, part } => {
+                    let found = self.light_found(light as usize, part as usize, &surface, last.as_ref());
+                    path.radiance += path.throughput * found;
                     break;
                 }
                 Owner::Material(material) => &self.scene.materials[material],
@@ -153,7 +152,7 @@ impl<'a> Tracer<'a> {
 
     fn material_of(&self, surface: &Surface) -> Option<&'a Material> {
         match surface.owner {
-            Owner::Light(_) => None,
+            Owner::Light { .. } => None,
             Owner::Material(material) => Some(&self.scene.materials[material]),
         }
     }
@@ -204,14 +203,15 @@ impl<'a> Tracer<'a> {
             let reflected = self.reflected(brdf, vertex, arrival.wi, arrival.pdf);
             self.add_unhidden(reflected, &arrival.shadow, arrival.irradiance, path);
         }
-        if let Some(radiance) = self.scene.environment
+        if let Some(environment) = &self.scene.environment
             && self.strategy != Strategy::MaterialOnly
         {
-            let local = sampling::cosine_hemisphere(DVec2::new(rng.random(), rng.random()));
-            let pdf = sampling::cosine_hemisphere_pdf(local);
-            let wi = vertex.frame.to_world(local).normalize();
-            let reflected = self.reflected(brdf, vertex, wi, Some(pdf));
-            self.add_unhidden(reflected, &Ray::new(vertex.point.above(), wi), radiance / pdf, path);
+            let sky = environment.sample(&vertex.frame, DVec2::new(rng.random(), rng.random()));
+            let irradiance = sky.radiance / sky.pdf;
+            if irradiance.is_finite() {
+                let reflected = self.reflected(brdf, vertex, sky.wi, Some(sky.pdf));
+                self.add_unhidden(reflected, &Ray::new(vertex.point.above(), sky.wi), irradiance, path);
+            }
         }
     }
 
@@ -246,21 +246,21 @@ impl<'a> Tracer<'a> {
     }
 
     /// Radiance of a light that a ray ran into, times the weight of having found it so.
-    fn light_found(&self, light: usize, surface: &Surface, last: Option<&Scatter>) -> DVec3 {
+    fn light_found(&self, light: usize, part: usize, surface: &Surface, last: Option<&Scatter>) -> DVec3 {
         let light = &self.scene.lights[light];
-        let weight = last
-            .map_or(1.0, |from| self.strategy.weight(from.pdf, light.pdf(from.position, surface.point.position), true));
+        let weight = last.map_or(1.0, |from| {
+            let aimed = light.pdf(part, from.position, surface.point.position);
+            self.strategy.weight(from.pdf, aimed, true)
+        });
         light.radiance() * weight
     }
 
     /// Radiance of the environment behind a ray that met nothing, times the weight of having found it so.
     fn environment_found(&self, ray: &Ray, last: Option<&Scatter>) -> DVec3 {
-        let Some(radiance) = self.scene.environment else { return DVec3::ZERO };
-        let weight = last.map_or(1.0, |from| {
-            let cosine = from.normal.dot(ray.direction).clamp(0.0, f64::INFINITY);
-            self.strategy.weight(from.pdf, FRAC_1_PI * cosine, true)
-        });
-        radiance * weight
+        let Some(environment) = &self.scene.environment else { return DVec3::ZERO };
+        let Some(from) = last else { return environment.radiance(ray.direction) };
+        let (radiance, pdf) = environment.find(from.normal, ray.direction);
+        radiance * self.strategy.weight(from.pdf, pdf, true)
     }
 
     /// Phong's equation at the vertex.

@@ -36,8 +36,9 @@ impl std::fmt::Debug for Material {
 /// direction to the light, b to the eye and r the mirror image of s about the normal n (Phong 1975).
 ///
 /// It is a rule for shading, not a BRDF: a light's distance, size and power don't enter (no 1/r²; the products r I are the
-/// radiances to show), nothing is normalised, and light does not travel on: a path ends here. A quad light stands at its centre, and
-/// shines on either side of it; a constant environment is the ambient term's business.
+/// radiances to show), nothing is normalised, and light does not travel on: a path ends here. A quad or sphere light stands at its centre,
+/// and a quad shines on either side; a spot light is seen from inside its cone; a mesh light is not seen; an environment is
+/// the ambient term's business.
 ///
 /// The rule itself is [`PhongShading`], which knows no horizon. The tracer adds one: a light below the surface's horizon is not
 /// seen, so it adds nothing, no highlight either.

@@ -8,7 +8,7 @@ fn a_scene_printed_to_a_file_renders_as_the_built_in_one() {
     let list = b.json(&["scenes"]);
     let scenes: Vec<&str> =
         list["scenes"].as_array().expect("a list").iter().map(|s| s["name"].as_str().expect("a name")).collect();
-    for name in ["sphere", "sphere-on-plane", "cornell"] {
+    for name in ["sphere", "sphere-on-plane", "cornell", "mesh-env"] {
         assert!(scenes.contains(&name), "{scenes:?}");
     }
     for name in scenes {
@@ -52,4 +52,18 @@ fn size_samples_and_seed_are_what_was_asked_for() {
     }
     b.ok(&["render", "--size", "20x10", "--samples", "3", "--seed", "8", "--out", "other.exr"]);
     assert!(b.exr("other.exr").radiance != image.radiance, "another seed, other noise");
+}
+
+#[test]
+fn a_rendered_picture_lights_another_scene_and_is_not_overwritten_by_it() {
+    let b = Bench::new();
+    b.ok(&["render", "--scene", "furnace", "--size", "32x17", "--samples", "2", "--out", "sky.exr"]);
+    let scene = b.ok(&["scenes", "furnace", "--toml"]).text();
+    b.write("lit.toml", scene.replace("radiance = [1, 1, 1]", "file = \"sky.exr\""));
+    let refused = b.picture("sky.exr", &["lit.toml"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.err.contains("would destroy the input") && refused.err.contains("sky.exr"), "{}", refused.err);
+    let ran = b.picture("lit.exr", &["lit.toml"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(b.exr("lit.exr").radiance.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
 }

@@ -1,10 +1,20 @@
 //! Lights: each is a file, the closed set is [`Light`]. A light answers which light arrives at a point, and from where.
 
+mod environment;
+mod mesh;
+mod pick;
 mod rectangle;
+mod sphere;
+mod spherical_triangle;
+mod spot;
 
 use glam::{DVec2, DVec3};
 
+pub use environment::{Environment, EnvironmentImage};
+pub use mesh::MeshLight;
 pub use rectangle::{QuadLight, SMALL_SOLID_ANGLE};
+pub use sphere::SphereLight;
+pub use spot::SpotLight;
 
 use super::ray::{Ray, SurfacePoint};
 
@@ -26,8 +36,14 @@ pub enum Light {
         /// On a surface that faces it, W/m².
         irradiance: DVec3,
     },
+    /// A point that shines into a cone.
+    Spot(SpotLight),
     /// A shining parallelogram.
     Quad(QuadLight),
+    /// A shining sphere.
+    Sphere(SphereLight),
+    /// Shining triangles.
+    Mesh(MeshLight),
 }
 
 /// Light that arrives at a point from one direction.
@@ -57,37 +73,49 @@ impl Light {
                 let shadow = Ray::new(at.above(), *toward);
                 Some(Arrival { wi: *toward, irradiance: *irradiance, pdf: None, shadow })
             }
+            Self::Spot(light) => light.sample(at, u),
             Self::Quad(light) => light.sample(at, u),
+            Self::Sphere(light) => light.sample(at, u),
+            Self::Mesh(light) => light.sample(at, u),
         }
     }
 
-    /// The direction and the segment by which Phong's equation sees the light; a quad stands at its centre.
+    /// The direction and the segment by which Phong's equation sees the light; a quad and a sphere stand at their centre, a mesh
+    /// has no place that stands for it and is not seen.
     pub fn as_seen_by_equation(&self, at: &SurfacePoint) -> Option<Ray> {
         match self {
             Self::Point { position, .. } => Ray::between(at.above(), *position),
             Self::Directional { toward, .. } => Some(Ray::new(at.above(), *toward)),
+            Self::Spot(light) => light.segment(at),
             Self::Quad(light) => light.segment_to_centre(at),
+            Self::Sphere(light) => light.segment_to_centre(at),
+            Self::Mesh(_) => None,
         }
     }
 
     /// Whether a ray can run into the light.
     pub fn has_surface(&self) -> bool {
-        matches!(self, Self::Quad(_))
+        matches!(self, Self::Quad(_) | Self::Sphere(_) | Self::Mesh(_))
     }
 
     /// Radiance that leaves the light's surface along −`direction`, on the side of its normal.
     pub fn radiance(&self) -> DVec3 {
         match self {
             Self::Quad(light) => light.radiance,
-            Self::Point { .. } | Self::Directional { .. } => DVec3::ZERO,
+            Self::Sphere(light) => light.radiance,
+            Self::Mesh(light) => light.radiance,
+            Self::Point { .. } | Self::Directional { .. } | Self::Spot(_) => DVec3::ZERO,
         }
     }
 
-    /// Density (1/sr) with which [`Light::sample`] draws the direction from `from` to the point `to` of the light's surface.
-    pub fn pdf(&self, from: DVec3, to: DVec3) -> f64 {
+    /// Density (1/sr) with which [`Light::sample`] draws the direction from `from` to the point `to` of the light's surface, which
+    /// belongs to its triangle `part` where it is a mesh.
+    pub fn pdf(&self, part: usize, from: DVec3, to: DVec3) -> f64 {
         match self {
             Self::Quad(light) => light.pdf(from, to),
-            Self::Point { .. } | Self::Directional { .. } => 0.0,
+            Self::Sphere(light) => light.pdf(from),
+            Self::Mesh(light) => light.pdf(part, from, to),
+            Self::Point { .. } | Self::Directional { .. } | Self::Spot(_) => 0.0,
         }
     }
 }

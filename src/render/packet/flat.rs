@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::lights::{Light, QuadLight};
+use super::super::lights::{Environment, Light, QuadLight};
 use super::super::material::Material;
 use super::super::ray::gamma;
 use super::super::scene::Scene;
@@ -53,9 +53,18 @@ pub(in crate::render) struct FlatScene<'a> {
 }
 
 impl<'a> FlatScene<'a> {
-    /// The scene, where packets can walk through it: no meshes, no tables, no shading rules, not too many shapes.
+    /// The scene, where packets can walk through it: no meshes, no tables, no shading rules, no lights but points,
+    /// parallel light, quads and an even environment, not too many shapes.
     pub fn of(scene: &'a Scene) -> Option<Self> {
         let (spheres, planes, quads) = scene.geometry.analytic()?;
+        let environment = match scene.environment {
+            None => None,
+            Some(Environment::Constant(radiance)) => Some(radiance),
+            Some(Environment::Image(_)) => return None,
+        };
+        if scene.lights.iter().any(|light| matches!(light, Light::Spot(_) | Light::Sphere(_) | Light::Mesh(_))) {
+            return None;
+        }
         let materials: Vec<Lobes> = scene.materials.iter().map(lobes).collect::<Option<_>>()?;
         if spheres.len() + planes.len() + quads.len() > MOST_SHAPES || materials.len() > MOST_MATERIALS {
             return None;
@@ -78,7 +87,7 @@ impl<'a> FlatScene<'a> {
             lobes: most,
             materials,
             lights: &scene.lights,
-            environment: scene.environment,
+            environment,
             max_bounces: scene.max_bounces,
         })
     }
@@ -96,8 +105,8 @@ impl<'a> FlatScene<'a> {
     /// The lights that have a surface, with their owner's number.
     pub(super) fn shining(&self) -> impl Iterator<Item = (OwnerNumber, &'a QuadLight)> {
         self.lights.iter().enumerate().filter_map(|(i, light)| match light {
-            Light::Quad(quad) => Some((number(Owner::Light(i)), quad)),
-            Light::Point { .. } | Light::Directional { .. } => None,
+            Light::Quad(quad) => Some((-1.0 - i as f64, quad)),
+            _ => None,
         })
     }
 }
@@ -112,7 +121,7 @@ impl Piece {
 fn number(owner: Owner) -> OwnerNumber {
     match owner {
         Owner::Material(i) => i as f64,
-        Owner::Light(i) => -1.0 - i as f64,
+        Owner::Light { light, .. } => -1.0 - light as f64,
     }
 }
 

@@ -257,6 +257,8 @@ impl<const SHADOWS: bool, const BOUNCES: bool, const GLOSSY: bool> One<'_, SHADO
                     let point = self.point(simd, self.decision(bounce, OF_EVENT + k as u32));
                     (from_quad(quad, at, point), quad.radiance)
                 }
+                // Scenes with these are not walked through.
+                Light::Spot(_) | Light::Sphere(_) | Light::Mesh(_) => continue,
             };
             self.add_unhidden(vertices, &arrivals, strength, state);
         }

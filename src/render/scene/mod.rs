@@ -2,12 +2,21 @@
 
 mod build;
 mod builtin;
+mod icosphere;
+mod light_spec;
+mod parts;
+mod sky;
 mod spec;
 mod validate;
+mod validate_lights;
 
 pub use build::Scene;
 pub use builtin::{BUILT_IN, BuiltIn, builtin};
+pub use light_spec::{
+    BuiltInSky, DirectionalLightSpec, EnvironmentSpec, LightsSpec, MeshLightSpec, PointLightSpec, QuadLightSpec,
+    SphereLightSpec, SpotLightSpec,
+};
 pub use spec::{
-    CameraSpec, DirectionalLightSpec, EnvironmentSpec, EquationSpec, FilmSpec, LightsSpec, MaterialSpec, MeshNormals,
-    MeshSpec, PhongLobeSpec, PlaneSpec, PointLightSpec, QuadLightSpec, QuadSpec, SceneSpec, SphereSpec,
+    BuiltInMesh, CameraSpec, EquationSpec, FilmSpec, MaterialSpec, MeshNormals, MeshSpec, PhongLobeSpec, PlacementSpec,
+    PlaneSpec, QuadSpec, SceneSpec, SphereSpec,
 };

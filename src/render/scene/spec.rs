@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::super::RenderError;
+use super::light_spec::LightsSpec;
 
 /// A scene file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -165,17 +166,52 @@ pub struct QuadSpec {
     pub material: String,
 }
 
-/// A triangle mesh in an OBJ file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A triangle mesh, from a `file` or `builtin`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshSpec {
-    /// The file, relative to the scene file.
-    pub file: PathBuf,
+    /// An OBJ, PLY or glTF file (`.obj`, `.ply`, `.gltf`, `.glb`), relative to the scene file.
+    #[serde(default)]
+    pub file: Option<PathBuf>,
+    /// A mesh that the program makes.
+    #[serde(default)]
+    pub builtin: Option<BuiltInMesh>,
     /// Name of its material.
     pub material: String,
     /// Which normals shade it.
     #[serde(default)]
     pub normals: MeshNormals,
+    /// Where it stands: once per entry, sharing its triangles; if left out, once where the file puts it.
+    #[serde(default, rename = "instance")]
+    pub instances: Vec<PlacementSpec>,
+}
+
+/// Meshes that the program makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BuiltInMesh {
+    /// A unit sphere of 327,680 triangles with bumps of up to 7.5 %.
+    DisplacedIcosphere,
+}
+
+/// Where a mesh stands: it is scaled, then turned about an axis through 0, then moved.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PlacementSpec {
+    /// What lengths are multiplied by, above 0.
+    pub scale: f64,
+    /// The axis, of any length but 0.
+    pub axis: [f64; 3],
+    /// Angle about the axis, degrees, right-handed.
+    pub rotate_deg: f64,
+    /// The move, m.
+    pub translate: [f64; 3],
+}
+
+impl Default for PlacementSpec {
+    fn default() -> Self {
+        Self { scale: 1.0, axis: [0.0, 1.0, 0.0], rotate_deg: 0.0, translate: [0.0; 3] }
+    }
 }
 
 /// Which normals shade a mesh.
@@ -187,62 +223,6 @@ pub enum MeshNormals {
     Face,
     /// The file's vertex normals, interpolated.
     Vertex,
-}
-
-/// All lights of a scene. A light shines on the side of its normal and is seen by the camera if it has a surface.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LightsSpec {
-    /// Point lights.
-    pub point: Vec<PointLightSpec>,
-    /// Lights at infinity.
-    pub directional: Vec<DirectionalLightSpec>,
-    /// Shining parallelograms.
-    pub quad: Vec<QuadLightSpec>,
-    /// Light from everywhere.
-    pub environment: Option<EnvironmentSpec>,
-}
-
-/// A point that shines alike in all directions.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PointLightSpec {
-    /// Where, m.
-    pub position: [f64; 3],
-    /// Radiant intensity, W/sr, at least 0.
-    pub intensity: [f64; 3],
-}
-
-/// Parallel light.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DirectionalLightSpec {
-    /// Direction towards the light, of any length but 0.
-    pub toward: [f64; 3],
-    /// Irradiance on a surface that faces it, W/m², at least 0.
-    pub irradiance: [f64; 3],
-}
-
-/// A parallelogram as in [`QuadSpec`] whose front shines alike in all directions.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct QuadLightSpec {
-    /// Centre, m.
-    pub center: [f64; 3],
-    /// First half-edge, m.
-    pub u: [f64; 3],
-    /// Second half-edge, m; not parallel to the first.
-    pub v: [f64; 3],
-    /// Radiance, W/(sr·m²), at least 0.
-    pub radiance: [f64; 3],
-}
-
-/// Light of one radiance from all directions.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EnvironmentSpec {
-    /// Radiance, W/(sr·m²), at least 0.
-    pub radiance: [f64; 3],
 }
 
 impl SceneSpec {
@@ -268,6 +248,15 @@ impl SceneSpec {
     /// The names of the materials that are files, with those files as typed: the caller resolves them before building.
     pub fn material_files(&self) -> impl Iterator<Item = (&str, &Path)> {
         self.materials.iter().filter_map(|(name, spec)| Some((name.as_str(), spec.file.as_deref()?)))
+    }
+
+    /// All files that the scene is made of, as typed.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let materials = self.material_files().map(|(_, file)| file);
+        let meshes = self.meshes.iter().filter_map(|mesh| mesh.file.as_deref());
+        let lights = self.lights.mesh.iter().map(|light| light.file.as_path());
+        let sky = self.lights.environment.iter().filter_map(|sky| sky.file.as_deref());
+        materials.chain(meshes).chain(lights).chain(sky)
     }
 }
 

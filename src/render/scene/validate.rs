@@ -4,15 +4,16 @@ use glam::DVec3;
 
 use super::super::RenderError;
 use super::super::film::MAX_PIXELS;
-use super::spec::{MaterialSpec, SceneSpec};
+use super::spec::{MaterialSpec, MeshNormals, PlacementSpec, SceneSpec};
+use super::validate_lights::validate_lights;
 
 /// Names the place of one value for the checks below.
-struct Check<'a> {
+pub(super) struct Check<'a> {
     origin: &'a str,
 }
 
 impl Check<'_> {
-    fn fail(&self, field: &str, value: impl std::fmt::Debug, constraint: &str) -> RenderError {
+    pub(super) fn fail(&self, field: &str, value: impl std::fmt::Debug, constraint: &str) -> RenderError {
         RenderError::Field {
             origin: self.origin.into(),
             field: field.into(),
@@ -21,29 +22,46 @@ impl Check<'_> {
         }
     }
 
-    fn holds(&self, ok: bool, field: &str, value: impl std::fmt::Debug, constraint: &str) -> Result<(), RenderError> {
+    pub(super) fn holds(
+        &self,
+        ok: bool,
+        field: &str,
+        value: impl std::fmt::Debug,
+        constraint: &str,
+    ) -> Result<(), RenderError> {
         if ok { Ok(()) } else { Err(self.fail(field, value, constraint)) }
     }
 
-    fn finite(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
+    pub(super) fn finite(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
         self.holds(v.iter().all(|x| x.is_finite()), field, v, "three finite numbers")
     }
 
-    fn direction(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
+    pub(super) fn direction(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
         self.finite(field, v)?;
         self.holds(DVec3::from(v).try_normalize().is_some(), field, v, "a direction, so not 0 0 0")
     }
 
-    fn color(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
+    pub(super) fn color(&self, field: &str, v: [f64; 3]) -> Result<(), RenderError> {
         self.holds(v.iter().all(|x| x.is_finite() && *x >= 0.0), field, v, "three finite numbers of at least 0")
     }
 
-    fn half_edges(&self, place: &str, u: [f64; 3], v: [f64; 3]) -> Result<(), RenderError> {
+    pub(super) fn half_edges(&self, place: &str, u: [f64; 3], v: [f64; 3]) -> Result<(), RenderError> {
         self.direction(&format!("{place}.u"), u)?;
         self.direction(&format!("{place}.v"), v)?;
         let (a, b) = (DVec3::from(u).normalize(), DVec3::from(v).normalize());
         let spans = a.cross(b).length() > 1e-12;
         self.holds(spans, &format!("{place}.v"), v, "a direction other than that of `u`")
+    }
+
+    pub(super) fn radius(&self, field: &str, radius: f64) -> Result<(), RenderError> {
+        self.holds(radius.is_finite() && radius > 0.0, field, radius, "a finite number above 0")
+    }
+
+    pub(super) fn placement(&self, place: &str, p: &PlacementSpec) -> Result<(), RenderError> {
+        self.radius(&format!("{place}.scale"), p.scale)?;
+        self.direction(&format!("{place}.axis"), p.axis)?;
+        self.holds(p.rotate_deg.is_finite(), &format!("{place}.rotate_deg"), p.rotate_deg, "a finite number")?;
+        self.finite(&format!("{place}.translate"), p.translate)
     }
 }
 
@@ -61,7 +79,7 @@ impl SceneSpec {
             validate_material(&check, &format!("materials.{name}"), material)?;
         }
         self.validate_shapes(&check)?;
-        self.validate_lights(&check)?;
+        validate_lights(&check, &self.lights)?;
         self.validate_names(&check)
     }
 
@@ -89,8 +107,7 @@ impl SceneSpec {
     fn validate_shapes(&self, check: &Check<'_>) -> Result<(), RenderError> {
         for (i, s) in self.spheres.iter().enumerate() {
             check.finite(&format!("sphere[{i}].center"), s.center)?;
-            let fits = s.radius.is_finite() && s.radius > 0.0;
-            check.holds(fits, &format!("sphere[{i}].radius"), s.radius, "a finite number above 0")?;
+            check.radius(&format!("sphere[{i}].radius"), s.radius)?;
         }
         for (i, p) in self.planes.iter().enumerate() {
             check.finite(&format!("plane[{i}].point"), p.point)?;
@@ -100,24 +117,17 @@ impl SceneSpec {
             check.finite(&format!("quad[{i}].center"), q.center)?;
             check.half_edges(&format!("quad[{i}]"), q.u, q.v)?;
         }
+        for (i, m) in self.meshes.iter().enumerate() {
+            let one = m.file.is_some() != m.builtin.is_some();
+            let found = if m.file.is_some() { "both" } else { "neither" };
+            check.holds(one, &format!("mesh[{i}]"), format_args!("{found}"), "either a `file` or a `builtin`")?;
+            let flat = m.builtin.is_none() || m.normals == MeshNormals::Face;
+            check.holds(flat, &format!("mesh[{i}].normals"), m.normals, "\"face\" where there is no `file`")?;
+            for (k, place) in m.instances.iter().enumerate() {
+                check.placement(&format!("mesh[{i}].instance[{k}]"), place)?;
+            }
+        }
         Ok(())
-    }
-
-    fn validate_lights(&self, check: &Check<'_>) -> Result<(), RenderError> {
-        for (i, l) in self.lights.point.iter().enumerate() {
-            check.finite(&format!("light.point[{i}].position"), l.position)?;
-            check.color(&format!("light.point[{i}].intensity"), l.intensity)?;
-        }
-        for (i, l) in self.lights.directional.iter().enumerate() {
-            check.direction(&format!("light.directional[{i}].toward"), l.toward)?;
-            check.color(&format!("light.directional[{i}].irradiance"), l.irradiance)?;
-        }
-        for (i, l) in self.lights.quad.iter().enumerate() {
-            check.finite(&format!("light.quad[{i}].center"), l.center)?;
-            check.half_edges(&format!("light.quad[{i}]"), l.u, l.v)?;
-            check.color(&format!("light.quad[{i}].radiance"), l.radiance)?;
-        }
-        self.lights.environment.iter().try_for_each(|e| check.color("light.environment.radiance", e.radiance))
     }
 
     /// Every material that is named is described.

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::super::bvh::Bvh;
 use super::super::ray::{Ray, SurfacePoint};
-use super::triangle::{self, ShearedRay};
+use super::instances::{Instances, Placement};
+use super::triangles::{TriangleHit, Triangles};
 use super::{Mesh, Plane, Quad, Sphere};
 
 /// To whom a piece of surface belongs.
@@ -12,8 +12,13 @@ use super::{Mesh, Plane, Quad, Sphere};
 pub enum Owner {
     /// Index of a material.
     Material(usize),
-    /// Index of a light; its front shines, and it reflects nothing.
-    Light(usize),
+    /// A light; its front shines, and it reflects nothing.
+    Light {
+        /// Index of the light.
+        light: u32,
+        /// Index of the triangle within a light that is a mesh, else 0.
+        part: u32,
+    },
 }
 
 /// Where a ray met a surface.
@@ -32,7 +37,8 @@ enum Hit {
     Sphere(usize),
     Plane(usize),
     Quad(usize, f64, f64),
-    Triangle(usize, f64, f64),
+    Triangle(TriangleHit),
+    Placed(usize, TriangleHit),
 }
 
 /// All shapes of a scene.
@@ -42,14 +48,7 @@ pub struct Geometry {
     planes: Vec<(Plane, Owner)>,
     quads: Vec<(Quad, Owner)>,
     triangles: Option<Triangles>,
-}
-
-#[derive(Debug)]
-struct Triangles {
-    bvh: Bvh,
-    corners: Vec<[DVec3; 3]>,
-    normals: Vec<Option<[DVec3; 3]>>,
-    owners: Vec<Owner>,
+    instances: Option<Instances>,
 }
 
 impl Geometry {
@@ -59,14 +58,15 @@ impl Geometry {
         planes: Vec<(Plane, Owner)>,
         quads: Vec<(Quad, Owner)>,
         meshes: Vec<(Mesh, Owner)>,
+        placed: Vec<(Mesh, Owner, Vec<Placement>)>,
     ) -> Self {
-        Self { spheres, planes, quads, triangles: Triangles::new(meshes) }
+        Self { spheres, planes, quads, triangles: Triangles::new(meshes), instances: Instances::new(placed) }
     }
 
     /// Spheres, planes and quads, where there is nothing else.
     #[allow(clippy::type_complexity)] // three lists
     pub fn analytic(&self) -> Option<(&[(Sphere, Owner)], &[(Plane, Owner)], &[(Quad, Owner)])> {
-        self.triangles.is_none().then_some((&self.spheres, &self.planes, &self.quads))
+        (self.triangles.is_none() && self.instances.is_none()).then_some((&self.spheres, &self.planes, &self.quads))
     }
 
     /// The surface that the ray meets first.
@@ -87,10 +87,13 @@ impl Geometry {
                 (t_max, best) = (t, Some(Hit::Quad(i, a, b)));
             }
         }
-        if let Some((t, hit)) = self.triangles.as_ref().and_then(|mesh| mesh.closest(&Ray { t_max, ..*ray })) {
-            (t_max, best) = (t, Some(hit));
+        if let Some(hit) = self.triangles.as_ref().and_then(|mesh| mesh.closest(&Ray { t_max, ..*ray })) {
+            (t_max, best) = (hit.t, Some(Hit::Triangle(hit)));
         }
-        best.map(|hit| self.surface(hit, ray.at(t_max)))
+        if let Some((t, i, hit)) = self.instances.as_ref().and_then(|all| all.closest(&Ray { t_max, ..*ray })) {
+            (t_max, best) = (t, Some(Hit::Placed(i, hit)));
+        }
+        best.and_then(|hit| self.surface(hit, ray.at(t_max)))
     }
 
     /// Whether anything, seen from either side, lies on the ray.
@@ -100,67 +103,18 @@ impl Geometry {
             || self.quads.iter().any(|(quad, _)| quad.hit(ray, t_max).is_some())
             || self.planes.iter().any(|(plane, _)| plane.hit(ray, t_max).is_some())
             || self.triangles.as_ref().is_some_and(|mesh| mesh.occluded(ray))
+            || self.instances.as_ref().is_some_and(|all| all.occluded(ray))
     }
 
-    fn surface(&self, hit: Hit, p: DVec3) -> Surface {
+    fn surface(&self, hit: Hit, p: DVec3) -> Option<Surface> {
         let (point, owner) = match hit {
             Hit::Sphere(i) => (self.spheres[i].0.surface(p), self.spheres[i].1),
             Hit::Plane(i) => (self.planes[i].0.surface(p), self.planes[i].1),
             Hit::Quad(i, a, b) => (self.quads[i].0.surface(a, b), self.quads[i].1),
-            Hit::Triangle(i, b1, b2) => return self.triangle_surface(i, b1, b2),
+            Hit::Triangle(hit) => return self.triangles.as_ref().map(|mesh| mesh.surface(&hit)),
+            Hit::Placed(i, hit) => return self.instances.as_ref().map(|all| all.surface(i, &hit)),
         };
-        Surface { point, shading_normal: point.normal, owner }
-    }
-
-    fn triangle_surface(&self, i: usize, b1: f64, b2: f64) -> Surface {
-        debug_assert!(self.triangles.is_some());
-        let (corners, normals, owner) = self.triangles.as_ref().map_or(
-            ([DVec3::ZERO; 3], None, Owner::Material(0)), // never: the index came from these triangles
-            |mesh| (mesh.corners[i], mesh.normals[i], mesh.owners[i]),
-        );
-        let point = triangle::surface(&corners, b1, b2);
-        let smooth = normals.and_then(|[n0, n1, n2]| ((1.0 - b1 - b2) * n0 + b1 * n1 + b2 * n2).try_normalize());
-        Surface { point, shading_normal: smooth.unwrap_or(point.normal), owner }
-    }
-}
-
-impl Triangles {
-    fn new(meshes: Vec<(Mesh, Owner)>) -> Option<Self> {
-        let (mut corners, mut normals, mut owners) = (Vec::new(), Vec::new(), Vec::new());
-        for (mesh, owner) in meshes {
-            normals.extend((0..mesh.triangles.len()).map(|i| mesh.normals.get(i).copied()));
-            owners.extend(std::iter::repeat_n(owner, mesh.triangles.len()));
-            corners.extend(mesh.triangles);
-        }
-        if corners.is_empty() {
-            return None;
-        }
-        let boxes: Vec<_> =
-            corners.iter().map(|[a, b, c]: &[DVec3; 3]| (a.min(*b).min(*c), a.max(*b).max(*c))).collect();
-        let (bvh, order) = Bvh::new(&boxes);
-        let sorted = |i: &u32| *i as usize;
-        Some(Self {
-            bvh,
-            corners: order.iter().map(|i| corners[sorted(i)]).collect(),
-            normals: order.iter().map(|i| normals[sorted(i)]).collect(),
-            owners: order.iter().map(|i| owners[sorted(i)]).collect(),
-        })
-    }
-
-    fn closest(&self, ray: &Ray) -> Option<(f64, Hit)> {
-        let sheared = ShearedRay::new(ray);
-        let mut found = None;
-        self.bvh.traverse(ray, false, |i, t_max| {
-            let (t, b1, b2) = sheared.hit(&self.corners[i], t_max)?;
-            found = Some((t, Hit::Triangle(i, b1, b2)));
-            Some(t)
-        });
-        found
-    }
-
-    fn occluded(&self, ray: &Ray) -> bool {
-        let sheared = ShearedRay::new(ray);
-        self.bvh.traverse(ray, true, |i, t_max| Some(sheared.hit(&self.corners[i], t_max)?.0)).is_some()
+        Some(Surface { point, shading_normal: point.normal, owner })
     }
 }
 
@@ -171,6 +125,7 @@ mod tests {
     use super::*;
     use crate::geometry::sampling::uniform_sphere;
     use crate::numeric::random::{Purpose, RngExt, Stream, stream};
+    use crate::render::shapes::triangle::ShearedRay;
 
     fn point(rng: &mut Stream) -> DVec3 {
         DVec3::new(rng.random(), rng.random(), rng.random()) - 0.5
@@ -191,7 +146,7 @@ mod tests {
                 })
                 .collect();
             let mesh = Mesh { triangles: triangles.clone(), normals: Vec::new() };
-            let geometry = Geometry::new(vec![], vec![], vec![], vec![(mesh, Owner::Material(0))]);
+            let geometry = Geometry::new(vec![], vec![], vec![], vec![(mesh, Owner::Material(0))], vec![]);
             let mut met = 0;
             for i in 0..4000 {
                 let direction = uniform_sphere(DVec2::new(rng.random(), rng.random()));
@@ -204,7 +159,7 @@ mod tests {
                 let ray = Ray { origin, direction: if i % 2 == 0 { direction } else { aimed }, t_max };
                 let sheared = ShearedRay::new(&ray);
                 let want = triangles.iter().filter_map(|c| sheared.hit(c, t_max)).map(|h| h.0).min_by(f64::total_cmp);
-                let found = geometry.triangles.as_ref().and_then(|mesh| mesh.closest(&ray)).map(|h| h.0);
+                let found = geometry.triangles.as_ref().and_then(|mesh| mesh.closest(&ray)).map(|h| h.t);
                 assert!(found == want, "ray {i} at scale {scale:e}: {found:?} vs {want:?}");
                 assert_eq!(geometry.occluded(&ray), want.is_some());
                 met += usize::from(want.is_some());

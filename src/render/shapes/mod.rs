@@ -1,14 +1,17 @@
 //! Shapes: where a ray meets them, and the normal there. Each is a file; all of a scene's are a [`Geometry`].
 
 mod geometry;
+mod instances;
 mod mesh;
 mod plane;
 mod quad;
 mod sphere;
-mod triangle;
+pub mod triangle;
+mod triangles;
 
 pub use geometry::{Geometry, Owner, Surface};
-pub use mesh::{Mesh, read_obj};
+pub use instances::Placement;
+pub use mesh::{Mesh, read_mesh};
 pub use plane::Plane;
 pub use quad::Quad;
 pub use sphere::Sphere;

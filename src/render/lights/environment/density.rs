@@ -1,0 +1,107 @@
+//! The density with which directions are drawn from a picture of the sky.
+//!
+//! Within a cell the radiance is bilinear in φ and θ; the density is bilinear in φ and the solid angle, with the radiance's corners
+//! (the mean of the three channels). So both vanish at the same corners and edges, and their ratio stays between ½ and 2 for
+//! grey light. In the two rows at the poles, where θ and solid angle part, the density is the same all over a cell. A
+//! cell's probability is its mean corner times its solid angle: nothing is integrated numerically.
+
+use glam::DVec2;
+
+use super::super::pick::pick;
+use super::lat_long::{LatLong, Place};
+
+/// Sums over the cells of a picture, in the order in which they are searched.
+#[derive(Debug)]
+pub struct Density {
+    /// Running sum over the rows of cells, W/m².
+    rows: Vec<f64>,
+    /// Running sums of the mean corner along each row of cells, W/(sr·m²).
+    cells: Vec<f64>,
+}
+
+/// Brightness at the corners of a cell: left and right above, left and right below; W/(sr·m²).
+pub type Corners = [f64; 4];
+
+impl Density {
+    /// The density of a grid whose cells have these corners.
+    pub fn new(grid: &LatLong, corners: impl Fn(usize, usize) -> Corners) -> Self {
+        let (mut rows, mut total) = (Vec::with_capacity(grid.height - 1), 0.0);
+        let mut cells = Vec::with_capacity(grid.width * (grid.height - 1));
+        for row in 0..grid.height - 1 {
+            let mut sum = 0.0;
+            for column in 0..grid.width {
+                sum += mean(corners(column, row));
+                cells.push(sum);
+            }
+            total += sum * grid.solid_angle(row);
+            rows.push(total);
+        }
+        Self { rows, cells }
+    }
+
+    /// ∫ brightness dω, W/m²; 0 where the picture is black.
+    pub fn total(&self) -> f64 {
+        self.rows.last().copied().unwrap_or(0.0)
+    }
+
+    /// Density at a place, per sr.
+    pub fn pdf(&self, grid: &LatLong, place: &Place, corners: Corners) -> f64 {
+        if at_pole(grid, place.row) {
+            return mean(corners) / self.total();
+        }
+        let [a, b, c, d] = corners;
+        (lerp(lerp(a, b, place.x), lerp(c, d, place.x), place.s)) / self.total()
+    }
+
+    /// Column, row, and the coordinates x and s of a place drawn with two numbers in [0, 1).
+    pub fn sample(
+        &self,
+        grid: &LatLong,
+        corners: impl Fn(usize, usize) -> Corners,
+        u: DVec2,
+    ) -> (usize, usize, f64, f64) {
+        let (row, s) = pick(&self.rows, u.x);
+        let (column, x) = pick(self.cells.get(row * grid.width..(row + 1) * grid.width).unwrap_or_default(), u.y);
+        if at_pole(grid, row) {
+            return (column, row, x, s);
+        }
+        let [a, b, c, d] = corners(column, row);
+        let s = linear(a + b, c + d, s);
+        (column, row, linear(lerp(a, c, s), lerp(b, d, s), x), s)
+    }
+}
+
+fn at_pole(grid: &LatLong, row: usize) -> bool {
+    row == 0 || row + 2 == grid.height
+}
+
+fn mean([a, b, c, d]: Corners) -> f64 {
+    0.25 * ((a + b) + (c + d))
+}
+
+fn lerp(a: f64, b: f64, t: f64) -> f64 {
+    (1.0 - t) * a + t * b
+}
+
+/// t in [0, 1] with a density that runs linearly from a to b, both at least 0; the root's form that does not cancel.
+fn linear(a: f64, b: f64, u: f64) -> f64 {
+    let root = lerp(a * a, b * b, u).sqrt();
+    if a + root > 0.0 { (u * (a + b) / (a + root)).clamp(0.0, 1.0) } else { u }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_linear_density_is_inverted() {
+        for (a, b) in [(1.0, 1.0), (0.0, 2.0), (2.0, 0.0), (1e-9, 1.0), (3.0, 1e5)] {
+            for i in 0..=16 {
+                let u = f64::from(i) / 16.0;
+                let t = linear(a, b, u);
+                let back = t * (a + 0.5 * t * (b - a)) / (0.5 * (a + b));
+                assert!((back - u).abs() < 1e-12, "{a} to {b}, {u}: {back}");
+            }
+        }
+    }
+}

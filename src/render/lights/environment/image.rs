@@ -1,0 +1,195 @@
+//! An environment from a picture in latitude and longitude, bilinear between its pixels, sampled in proportion to its light.
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+
+use super::density::{Corners, Density};
+use super::lat_long::{LatLong, Place};
+use crate::image::{ColorGrid, read_exr_colors};
+use crate::render::RenderError;
+
+/// Pixels of an environment at most: 8192 × 4096, which take 0.7 GB.
+pub const MAX_PIXELS: u64 = 1 << 25;
+
+/// A picture of all directions (see [`LatLong`] for which pixel shows which).
+#[derive(Debug)]
+pub struct EnvironmentImage {
+    grid: LatLong,
+    pixels: Vec<[f32; 3]>,
+    /// What a pixel's value is multiplied by, at least 0.
+    scale: f64,
+    density: Density,
+}
+
+impl EnvironmentImage {
+    /// Reads an OpenEXR file: its radiance (W/(sr·m²)) is multiplied by `scale` and turned by `turn` (rad) about +y. `None` where it
+    /// gives no light at all.
+    ///
+    /// # Errors
+    /// [`RenderError::Image`] where it can't be read, [`RenderError::Environment`] where it is no picture of light: fewer than 2
+    /// rows, or a value that is negative or not finite.
+    pub fn read(path: &Path, scale: f64, turn: f64) -> Result<Option<Self>, RenderError> {
+        Self::new(path, read_exr_colors(path, MAX_PIXELS)?, scale, turn)
+    }
+
+    /// [`EnvironmentImage::read`] from pixels; errors call them `path`.
+    pub fn new(path: &Path, picture: ColorGrid, scale: f64, turn: f64) -> Result<Option<Self>, RenderError> {
+        check(path, &picture)?;
+        let grid = LatLong::new(picture.width, picture.height, turn);
+        let density = Density::new(&grid, |column, row| corners(&grid, &picture.pixels, column, row).map(brightness));
+        let shines = density.total() > 0.0 && scale > 0.0;
+        Ok(shines.then_some(Self { grid, pixels: picture.pixels, scale, density }))
+    }
+
+    /// Radiance from a unit direction, W/(sr·m²), and the density with which it is sampled, 1/sr.
+    pub fn find(&self, direction: DVec3) -> (DVec3, f64) {
+        let place = self.grid.place(direction);
+        let at = corners(&self.grid, &self.pixels, place.column, place.row);
+        (self.scale * bilinear(at, &place), self.density.pdf(&self.grid, &place, at.map(brightness)))
+    }
+
+    /// A unit direction drawn with two numbers in [0, 1).
+    pub fn sample(&self, u: DVec2) -> DVec3 {
+        let at = |column, row| -> Corners { corners(&self.grid, &self.pixels, column, row).map(brightness) };
+        let (column, row, x, s) = self.density.sample(&self.grid, at, u);
+        self.grid.direction(column, row, x, s)
+    }
+}
+
+fn check(path: &Path, picture: &ColorGrid) -> Result<(), RenderError> {
+    let wrong = |place: String, message: String| RenderError::Environment { path: path.into(), place, message };
+    let (width, height) = (picture.width, picture.height);
+    if width < 1 || height < 2 || picture.pixels.len() != width * height {
+        let message = format!("expected a picture of at least 1 x 2 pixels, found {width} x {height}");
+        return Err(wrong(String::new(), message));
+    }
+    for (i, pixel) in picture.pixels.iter().enumerate() {
+        if let Some(c) = pixel.iter().position(|x| !(x.is_finite() && *x >= 0.0)) {
+            let place = format!(", column {}, row {}, {}", i % width, i / width, ["red", "green", "blue"][c]);
+            return Err(wrong(place, format!("radiance is {}, expected a finite number of at least 0", pixel[c])));
+        }
+    }
+    Ok(())
+}
+
+/// The pixels at the corners of a cell: left and right above, left and right below.
+fn corners(grid: &LatLong, pixels: &[[f32; 3]], column: usize, row: usize) -> [DVec3; 4] {
+    let right = if column + 1 == grid.width { 0 } else { column + 1 };
+    let at = |column: usize, row: usize| DVec3::from(pixels[row * grid.width + column].map(f64::from));
+    [at(column, row), at(right, row), at(column, row + 1), at(right, row + 1)]
+}
+
+fn bilinear([a, b, c, d]: [DVec3; 4], place: &Place) -> DVec3 {
+    (a.lerp(b, place.x)).lerp(c.lerp(d, place.x), place.y)
+}
+
+/// Mean of the channels: it is 0 only where all of them are.
+fn brightness(radiance: DVec3) -> f64 {
+    radiance.element_sum() / 3.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::quadrature::integrate_directions;
+    use crate::numeric::random::{Purpose, RngExt, Stream, stream};
+    use crate::numeric::stats::chi_square_test;
+    use std::f64::consts::{PI, TAU};
+
+    fn picture(width: usize, height: usize, mut value: impl FnMut(usize, usize) -> [f32; 3]) -> ColorGrid {
+        let pixels = (0..width * height).map(|i| value(i % width, i / width)).collect();
+        ColorGrid { width, height, pixels }
+    }
+
+    fn environment(picture: ColorGrid, turn: f64) -> EnvironmentImage {
+        EnvironmentImage::new(Path::new("sky"), picture, 1.0, turn).unwrap().expect("shines")
+    }
+
+    /// Noise with black parts, a sun of a few pixels that is 10⁵ as bright, coloured channels.
+    fn noise(width: usize, height: usize, rng: &mut Stream) -> ColorGrid {
+        picture(width, height, |i, j| {
+            let sun = i / 3 == 2 && j == height / 3;
+            let dark = (i * height + j).is_multiple_of(3);
+            let value = |rng: &mut Stream| if dark { 0.0 } else { rng.random::<f32>() + if sun { 1e5 } else { 0.0 } };
+            [value(rng), if i % 2 == 0 { 0.0 } else { value(rng) }, value(rng)]
+        })
+    }
+
+    /// ∫ f over every cell apart, as (column, row) → value; f is smooth within a cell.
+    fn by_cells(width: usize, height: usize, turn: f64, f: impl Fn(DVec3) -> f64) -> Vec<f64> {
+        let cell = |k: usize| {
+            let (i, j) = ((k % width) as f64, (k / width) as f64);
+            let theta = (PI * j / (height - 1) as f64, PI * (j + 1.0) / (height - 1) as f64);
+            let phi = (TAU * (i + 0.5) / width as f64 - turn, TAU * (i + 1.5) / width as f64 - turn);
+            // The quadrature's azimuth runs from +x to +y about +z.
+            integrate_directions(theta, phi, 12, |d| f(DVec3::new(d.y, d.z, -d.x)))
+        };
+        (0..width * (height - 1)).map(cell).collect()
+    }
+
+    #[test]
+    fn the_density_integrates_to_one_and_vanishes_only_with_the_light() {
+        let mut rng = stream(5, Purpose::Study, 0);
+        for (width, height, turn) in [(1, 2, 0.0), (5, 3, 1.0), (16, 9, 0.3), (40, 21, -4.0)] {
+            let sky = environment(noise(width.max(2), height, &mut rng), turn);
+            let sum: f64 = by_cells(width.max(2), height, turn, |d| sky.find(d).1).iter().sum();
+            assert!((sum - 1.0).abs() < 1e-9, "{width} x {height}: {sum}");
+            for _ in 0..4000 {
+                let d = crate::geometry::sampling::uniform_sphere(DVec2::new(rng.random(), rng.random()));
+                let (radiance, pdf) = sky.find(d);
+                assert!(radiance == DVec3::ZERO || pdf > 0.0, "{d}: {radiance} but density {pdf}");
+                // Brightness over density is the whole's integral, but for at most a factor of 4 (2 away from the poles).
+                let ratio = brightness(radiance) / pdf / sky.density.total();
+                assert!(!(ratio > 4.0), "{d}: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn directions_follow_the_density() {
+        let mut rng = stream(6, Purpose::Study, 0);
+        for (width, height, turn) in [(2, 2, 0.0), (6, 3, 1.0), (16, 9, 0.3)] {
+            let sky = environment(noise(width, height, &mut rng), turn);
+            let draws = 100_000;
+            let mut counts = vec![0.0; width * (height - 1) * 4];
+            // Each cell in four: halves of φ and of θ.
+            for _ in 0..draws {
+                let d = sky.sample(DVec2::new(rng.random(), rng.random()));
+                let p = sky.grid.place(d);
+                let quarter = 2 * usize::from(p.y > 0.5) + usize::from(p.x > 0.5);
+                counts[4 * (p.row * width + p.column) + quarter] += 1.0;
+            }
+            let expected: Vec<f64> = {
+                let pdf = |d| sky.find(d).1;
+                let fine = |k: usize| {
+                    let (i, j, q) = ((k / 4 % width) as f64, (k / 4 / width) as f64, k % 4);
+                    let (x, y) = (0.5 * (q % 2) as f64, 0.5 * (q / 2) as f64);
+                    let theta = (PI * (j + y) / (height - 1) as f64, PI * (j + y + 0.5) / (height - 1) as f64);
+                    let at = |x: f64| TAU * (i + 0.5 + x) / width as f64 - turn;
+                    integrate_directions(theta, (at(x), at(x + 0.5)), 12, |d| pdf(DVec3::new(d.y, d.z, -d.x)))
+                };
+                (0..counts.len()).map(|k| f64::from(draws) * fine(k)).collect()
+            };
+            let (chi2, freedom, chance) = chi_square_test(&counts, &expected);
+            assert!(chance > 1e-3, "{width} x {height}: chi2 {chi2} of {freedom}, p {chance}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_picture_of_light_is_refused_with_its_place() {
+        let of = |picture| EnvironmentImage::new(Path::new("sky.exr"), picture, 1.0, 0.0).map(|sky| sky.is_some());
+        for (value, words) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (-1.0, "-1")] {
+            let bad = picture(4, 3, |i, j| if (i, j) == (3, 1) { [1.0, value, 1.0] } else { [1.0; 3] });
+            let message = of(bad).expect_err("refused").to_string();
+            let expected = format!("sky.exr, column 3, row 1, green: radiance is {words}, expected");
+            assert!(message.starts_with(&expected), "{message}");
+        }
+        for (width, height) in [(0, 0), (4, 1), (0, 4)] {
+            let message = of(picture(width, height, |_, _| [1.0; 3])).expect_err("refused").to_string();
+            assert!(message.contains(&format!("found {width} x {height}")), "{message}");
+        }
+        assert!(!of(picture(4, 3, |_, _| [0.0; 3])).unwrap(), "black is no light, and no error");
+        assert!(of(picture(4, 3, |_, _| [1e-38; 3])).unwrap());
+    }
+}

@@ -1,0 +1,139 @@
+//! The map between directions and the pixels of a picture in latitude and longitude.
+//!
+//! The direction (sinφ sinθ, cosθ, −cosφ sinθ), up being +y, has the column φ/2π·W − ½, which wraps, and the row θ/π·(H − 1):
+//! the first and the last row are the poles. Four neighbouring pixels are the corners of a cell; there are W·(H − 1).
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::DVec3;
+
+/// A grid of pixels over the sphere.
+#[derive(Debug, Clone)]
+pub struct LatLong {
+    /// Columns, at least 1.
+    pub width: usize,
+    /// Rows, at least 2.
+    pub height: usize,
+    /// Added to φ before the column is looked up, rad: turns what is seen by this angle about +y.
+    turn: f64,
+    /// sin²(θ/2) of every row; the share of the sphere above it.
+    cap: Vec<f64>,
+}
+
+/// A place in a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Column of the pixels on the left; the right ones are the next column, which after the last is the first.
+    pub column: usize,
+    /// Row of the upper pixels.
+    pub row: usize,
+    /// Distance from the left, 0 to 1, in φ.
+    pub x: f64,
+    /// Distance from above, 0 to 1, in θ.
+    pub y: f64,
+    /// Share of the cell's solid angle that lies above, 0 to 1.
+    pub s: f64,
+}
+
+impl LatLong {
+    /// The grid of a picture with `width` ≥ 1 columns and `height` ≥ 2 rows, turned by `turn` (rad) about +y: counter-clockwise
+    /// seen from above.
+    pub fn new(width: usize, height: usize, turn: f64) -> Self {
+        let cap = |row: usize| (FRAC_PI_2 * row as f64 / (height - 1) as f64).sin().powi(2);
+        Self { width, height, turn: turn % TAU, cap: (0..height).map(cap).collect() }
+    }
+
+    /// Solid angle of a cell in this row, sr: 2π/W·(cosθ_a − cosθ_b), as a product that does not cancel.
+    pub fn solid_angle(&self, row: usize) -> f64 {
+        let half = FRAC_PI_2 / (self.height - 1) as f64;
+        2.0 * TAU / self.width as f64 * (half * (2 * row + 1) as f64).sin() * half.sin()
+    }
+
+    /// Where a direction lies.
+    pub fn place(&self, d: DVec3) -> Place {
+        let (x, column) = self.across(d);
+        let flat = d.x.hypot(d.z);
+        let across = (self.height - 1) as f64 / PI;
+        let down = flat.atan2(d.y) * across;
+        let row = (down as usize).min(self.height - 2);
+        let y = (down - row as f64).clamp(0.0, 1.0);
+        // Measured from the nearer pole, where the share of the sphere keeps its digits.
+        let (from, angle, mirrored) = self.nearer_pole(row, flat, d.y);
+        let (low, high) = (self.cap[from], self.cap[from + 1]);
+        let s = (((0.5 * angle).sin().powi(2) - low) / (high - low)).clamp(0.0, 1.0);
+        Place { column, row, x, y, s: if mirrored { 1.0 - s } else { s } }
+    }
+
+    /// The unit direction of the point with coordinates x and s in a cell.
+    pub fn direction(&self, column: usize, row: usize, x: f64, s: f64) -> DVec3 {
+        let (from, _, mirrored) = self.nearer_pole(row, 0.0, 1.0);
+        let s = if mirrored { 1.0 - s } else { s };
+        let cap = self.cap[from] + s * (self.cap[from + 1] - self.cap[from]);
+        let flat = 2.0 * (cap * (1.0 - cap)).sqrt();
+        let up = if mirrored { 2.0 * cap - 1.0 } else { 1.0 - 2.0 * cap };
+        let (sin, cos) = ((column as f64 + x + 0.5) / self.width as f64 * TAU - self.turn).sin_cos();
+        DVec3::new(sin * flat, up, -cos * flat).normalize()
+    }
+
+    /// Row counted from the nearer pole, the angle from it, and whether that is the lower one.
+    fn nearer_pole(&self, row: usize, flat: f64, up: f64) -> (usize, f64, bool) {
+        if 2 * row + 1 < self.height {
+            (row, flat.atan2(up), false)
+        } else {
+            (self.height - 2 - row, flat.atan2(-up), true)
+        }
+    }
+
+    fn across(&self, d: DVec3) -> (f64, usize) {
+        let across = (d.x.atan2(-d.z) + self.turn) / TAU * self.width as f64 - 0.5;
+        let column = across.floor();
+        (across - column, (column as i64).rem_euclid(self.width as i64) as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::uniform_sphere;
+    use crate::numeric::random::{Purpose, RngExt, stream};
+    use glam::DVec2;
+
+    #[test]
+    fn directions_and_places_invert() {
+        let mut rng = stream(1, Purpose::Study, 0);
+        for (width, height, turn) in [(1, 2, 0.0), (8, 3, 0.4), (512, 256, -2.0), (5000, 4001, 7.0)] {
+            let grid = LatLong::new(width, height, turn);
+            for _ in 0..2000 {
+                let d = uniform_sphere(DVec2::new(rng.random(), rng.random()));
+                let p = grid.place(d);
+                let back = grid.direction(p.column, p.row, p.x, p.s);
+                // The angle from a pole loses digits only where its cosine is next to 1, and is formed from the half angle there.
+                assert!((back - d).length() < 1e-14, "{width} x {height}: {d} came back as {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_convention_is_as_stated() {
+        let grid = LatLong::new(512, 256, 0.0);
+        let (phi, theta) = (TAU * 100.5 / 512.0 + 1e-9, PI * 64.0 / 255.0 + 1e-9);
+        let p = grid.place(DVec3::new(phi.sin() * theta.sin(), theta.cos(), -phi.cos() * theta.sin()));
+        assert!(p.column == 100 && p.row == 64 && p.x < 1e-6 && p.y < 1e-6, "{p:?}");
+        // Left of the first column lies the last.
+        let p = grid.place(DVec3::new(1e-9, 0.0, -1.0));
+        assert!(p.column == 511 && (p.x - 0.5).abs() < 1e-6, "{p:?}");
+        // What lies at −z, turned by 90° about +y, is seen at −x.
+        let turned = LatLong::new(512, 256, FRAC_PI_2);
+        let (a, b) = (grid.place(-DVec3::Z), turned.place(-DVec3::X));
+        assert!(a.column == b.column && (a.x - b.x).abs() < 1e-9, "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn cells_fill_the_sphere() {
+        for (width, height) in [(1, 2), (7, 3), (512, 256)] {
+            let grid = LatLong::new(width, height, 0.0);
+            let sum: f64 = (0..height - 1).map(|row| width as f64 * grid.solid_angle(row)).sum();
+            assert!((sum / (2.0 * TAU) - 1.0).abs() < 1e-14, "{width} x {height}: {sum}");
+        }
+    }
+}
