@@ -121,7 +121,7 @@ impl Piece {
 fn number(owner: Owner) -> OwnerNumber {
     match owner {
         Owner::Material(i) => i as f64,
-        Owner::Light { light, .. } => -1.0 - light as f64,
+        Owner::Light { light, .. } => -1.0 - f64::from(light),
     }
 }
 

@@ -46,13 +46,13 @@ impl<S: Simd> Frames<S> {
 
     /// Coordinates in the frame.
     #[inline(always)]
-    pub fn to_local(&self, v: Vec3<S>) -> Vec3<S> {
+    pub fn to_local(self, v: Vec3<S>) -> Vec3<S> {
         Vec3::new(self.tangent.dot(v), self.bitangent.dot(v), self.normal.dot(v))
     }
 
     /// The vector with these coordinates.
     #[inline(always)]
-    pub fn to_world(&self, v: Vec3<S>) -> Vec3<S> {
+    pub fn to_world(self, v: Vec3<S>) -> Vec3<S> {
         self.tangent.scaled_plus(v.x, self.bitangent.scaled_plus(v.y, self.normal * v.z))
     }
 }
