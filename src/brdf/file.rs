@@ -347,14 +347,15 @@ fn read_lobe(lobe: FileLobe, index: usize, channels: usize) -> Result<Option<Lob
     let mut shape = Vec::new();
     for parameter in parameters {
         let name = field(&format!("shape.{}", parameter.name));
+        let (least, most) = parameter.bounds;
         let value = values.get(parameter.name).cloned().unwrap_or(Value::Null);
         let read = serde_json::from_value::<PerChannel<f64>>(value.clone()).ok().filter(|v| match v {
-            PerChannel::Shared(x) => x.is_finite() && *x >= 0.0,
-            PerChannel::Each(list) => list.len() == channels && list.iter().all(|x| x.is_finite() && *x >= 0.0),
+            PerChannel::Shared(x) => (least..=most).contains(x),
+            PerChannel::Each(list) => list.len() == channels && list.iter().all(|x| (least..=most).contains(x)),
         });
         shape.push(read.ok_or_else(|| MaterialError::Field {
             field: name,
-            expected: format!("a number ≥ 0, or {channels} of them"),
+            expected: format!("a number from {least} to {most:e}, or {channels} of them"),
             found: value.to_string(),
         })?);
     }
@@ -411,6 +412,13 @@ mod tests {
             ("312.5", "-1", "lobes[1].shape.exponent"),
             ("312.5", "\"sharp\"", "found \"sharp\""),
             ("312.5", "[1, 2, 3]", "lobes[1].shape.exponent"),
+            (
+                "312.5",
+                "1e9",
+                "lobes[1].shape.exponent: expected a number from 0.01 to 1e8, or 2 of them, found 1000000000.0",
+            ),
+            ("312.5", "[1, 1e9]", "lobes[1].shape.exponent"),
+            ("312.5", "1e-3", "lobes[1].shape.exponent"),
             ("\"channels\": [", "\"channels\": [\"b\",", "lobes[0].weight: expected 3 finite numbers"),
         ] {
             let wrong = text.replacen(from, to, 1);
