@@ -8,6 +8,8 @@ use super::material::{LobeTerm, Material, PerChannel};
 
 const FORMAT: &str = "goniofit-material";
 const VERSION: u64 = 1;
+/// Relative room for rounding at the ends of a parameter's range.
+const ROUNDING: f64 = 1e-9;
 
 /// Why a text is no material.
 #[derive(Debug, thiserror::Error)]
@@ -348,10 +350,12 @@ fn read_lobe(lobe: FileLobe, index: usize, channels: usize) -> Result<Option<Lob
     for parameter in parameters {
         let name = field(&format!("shape.{}", parameter.name));
         let (least, most) = parameter.bounds;
+        // A fit at the end of its range may have been rounded beyond it.
+        let is_possible = |x: f64| (least * (1.0 - ROUNDING)..=most * (1.0 + ROUNDING)).contains(&x);
         let value = values.get(parameter.name).cloned().unwrap_or(Value::Null);
         let read = serde_json::from_value::<PerChannel<f64>>(value.clone()).ok().filter(|v| match v {
-            PerChannel::Shared(x) => (least..=most).contains(x),
-            PerChannel::Each(list) => list.len() == channels && list.iter().all(|x| (least..=most).contains(x)),
+            PerChannel::Shared(x) => is_possible(*x),
+            PerChannel::Each(list) => list.len() == channels && list.iter().all(|x| is_possible(*x)),
         });
         shape.push(read.ok_or_else(|| MaterialError::Field {
             field: name,
@@ -417,6 +421,7 @@ mod tests {
                 "1e9",
                 "lobes[1].shape.exponent: expected a number from 0.01 to 1e8, or 2 of them, found 1000000000.0",
             ),
+            ("312.5", "1.0001e8", "lobes[1].shape.exponent"),
             ("312.5", "[1, 1e9]", "lobes[1].shape.exponent"),
             ("312.5", "1e-3", "lobes[1].shape.exponent"),
             ("\"channels\": [", "\"channels\": [\"b\",", "lobes[0].weight: expected 3 finite numbers"),
@@ -425,6 +430,9 @@ mod tests {
             assert_ne!(wrong, text, "{from}");
             let error = Material::from_json(&wrong).expect_err(to).to_string();
             assert!(error.contains(says), "{error} lacks {says}");
+        }
+        for end in ["1e8", "1.000000000000001e8", "0.01"] {
+            assert!(Material::from_json(&text.replacen("312.5", end, 1)).is_ok(), "{end}");
         }
         assert!(Material::from_json("[]").is_err() && Material::from_json("").is_err());
     }

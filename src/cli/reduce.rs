@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     let valid = table.values.len() as u64 - table.masked.total();
     let object = {
-        let lines: Vec<Line> = reduction.budget.lines.iter().map(|line| unsigned(line.clone())).collect();
+        let lines: Vec<Line> = reduction.budget.lines.iter().map(unsigned).collect();
         json!({
             "out": args.out, "budget_file": args.budget, "readings": raw.readings.len(), "entries": table.len(), "valid": valid,
             "components": table.common.len(), "budget": lines, "notes": table.notes,
@@ -84,8 +84,8 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 }
 
 /// Zero without a sign.
-fn unsigned(line: Line) -> Line {
-    Line { rms: line.rms + 0.0, relative: line.relative + 0.0, ..line }
+fn unsigned(line: &Line) -> Line {
+    Line { rms: line.rms + 0.0, relative: line.relative + 0.0, ..line.clone() }
 }
 
 /// The budget as text.
@@ -101,7 +101,7 @@ fn summary(out: &Path, raw: &Raw, reduction: &Reduction, valid: u64) -> String {
     );
     // Writing to a String can't fail.
     let _ = write!(text, "\n  {:<34} type   rms [1/sr]   of a reading (median)", "component, one σ");
-    for line in reduction.budget.lines.iter().map(|line| unsigned(line.clone())) {
+    for line in reduction.budget.lines.iter().map(unsigned) {
         let kind = if line.name == TOTAL { "" } else { line.kind.name() };
         let _ = write!(text, "\n  {:<34} {kind:<4} {:>12.3e}   {:>8.3} %", line.name, line.rms, 100.0 * line.relative);
     }

@@ -28,7 +28,7 @@ use crate::measurement::Measurement;
 pub(super) struct Args {
     #[command(flatten)]
     what: What,
-    /// Write the raw readings too, as CSV
+    /// Write the raw readings too, as CSV (`-` is stdout); Ctrl-C ends with what was read so far
     #[arg(long, value_name = "RAW.csv")]
     raw: Option<PathBuf>,
     /// Leave out effects that change readings of the sample by less than this relative tolerance (below 1), all together, noise counted by its σ

@@ -182,6 +182,8 @@ pub(super) fn normal(seed: u64, index: u64) -> f64 {
 mod tests {
     use super::*;
 
+    type Change = fn(&mut Instrument);
+
     #[test]
     fn readings_scatter_round_the_truth_by_the_sigma_they_state() {
         for (f, electrons, readings) in
@@ -219,7 +221,7 @@ mod tests {
             change(&mut instrument);
             instrument.fault().unwrap_or_default()
         };
-        let cases: [(fn(&mut Instrument), &str); 10] = [
+        let cases: [(Change, &str); 10] = [
             (
                 |i| i.electrons = 1e-300,
                 "instrument.electrons: expected 0 (no noise) or a number from 1e-3 to 1e15, found 1e-300",

@@ -196,7 +196,7 @@ fn a_measurement_without_any_value_is_a_failure_that_says_why() {
 fn wrong_inputs_are_named_as_they_were_typed_with_what_is_expected() {
     let b = reduced();
     let raw = b.text("raw.csv");
-    let bare: String = raw.lines().filter(|l| !l.starts_with('#')).map(|l| format!("{l}\n")).collect();
+    let bare: String = raw.split_inclusive('\n').filter(|l| !l.starts_with('#')).collect();
     std::fs::create_dir(b.path("sub")).expect("a folder");
     b.write("sub/hand.csv", &bare);
     b.write("flat.csv", format!("# dimension: 3\n{bare}"));
