@@ -70,11 +70,11 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
                 read(job, args, ui)
             })?;
+        if let Some(note) = raw.notes.first().filter(|_| raw.readings.iter().all(|r| r.entry.is_none())) {
+            return Err(Failure::stopped(format!("{note}: nothing is written")));
+        }
         if let Some(path) = &args.raw {
             write_text(path, &raw.to_csv(&plan.instrument))?;
-        }
-        if let Some(note) = raw.notes.first().filter(|_| raw.readings.is_empty()) {
-            return Err(Failure::stopped(format!("{note}: no measurement is written")));
         }
         let mut table = chain::reduced_until(&name, &raw, &plan.instrument, ui.control().stop)?.measurement;
         if args.raw.is_none() {

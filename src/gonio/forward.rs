@@ -91,25 +91,24 @@ impl Job<'_> {
                 }
                 let mut block = self.block(&readings[range.clone()], range.start);
                 passes.iter().for_each(|step| step.pass.apply(&mut block));
-                if block.is_cut {
-                    break;
-                }
-                control.progress.advance(range.len() as u64);
-                done.push((b, block.signal, block.error));
+                control.progress.advance(block.done as u64);
+                done.push((b, block.done, block.signal, block.error));
             }
             done
         };
         let workers = 0..rayon::current_num_threads().max(1);
-        let mut blocks: Vec<(usize, Vec<f64>, f64)> =
+        let mut blocks: Vec<(usize, usize, Vec<f64>, f64)> =
             workers.into_par_iter().with_max_len(1).flat_map_iter(worker).collect();
         control.progress.finish();
         blocks.sort_unstable_by_key(|(b, ..)| *b);
-        let whole = blocks.iter().enumerate().take_while(|(k, (b, ..))| k == b).count();
-        blocks.truncate(whole);
-        let quadrature_error = blocks.iter().map(|b| b.2).fold(0.0, f64::max);
-        let (kept, note) = ended(&readings, (whole * BLOCK).min(n));
+        // Up to the first block that is missing, and with the first that is not whole.
+        let whole = blocks.iter().enumerate().take_while(|(k, (b, done, ..))| k == b && *done == BLOCK).count();
+        let part = blocks.get(whole).filter(|(b, ..)| *b == whole).map_or(0, |(_, done, ..)| *done);
+        blocks.truncate(whole + usize::from(part > 0));
+        let quadrature_error = blocks.iter().map(|b| b.3).fold(0.0, f64::max);
+        let (kept, note) = ended(&readings, whole * BLOCK + part);
         let mut signal = Vec::with_capacity(kept * width);
-        blocks.into_iter().for_each(|(_, part, _)| signal.extend(part));
+        blocks.into_iter().for_each(|(.., part, _)| signal.extend(part));
         readings.truncate(kept);
         signal.truncate(kept * width);
         let raw = self.raw(readings, signal, quadrature_error);
@@ -146,7 +145,16 @@ impl Job<'_> {
         };
         let (wi, wo) = readings.iter().map(pair).unzip();
         let width = self.channels.len();
-        Block { first, readings, wi, wo, width, signal: vec![1.0; readings.len() * width], error: 0.0, is_cut: false }
+        Block {
+            first,
+            readings,
+            wi,
+            wo,
+            width,
+            signal: vec![1.0; readings.len() * width],
+            error: 0.0,
+            done: readings.len(),
+        }
     }
 }
 

@@ -107,7 +107,7 @@ impl Pass for Spread<'_> {
         let (mut f, mut out) = (vec![0.0; block.width], vec![0.0; block.width]);
         for (i, reading) in block.readings.iter().enumerate() {
             if self.stop.requested() {
-                block.is_cut = true;
+                block.done = i;
                 return;
             }
             let (gain, light) = (self.light.gain, &self.light);

@@ -48,8 +48,8 @@ pub(super) struct Block<'a> {
     pub signal: Vec<f64>,
     /// Largest share by which a quadrature may be off.
     pub error: f64,
-    /// Whether a pass was stopped before its end: signals mean nothing then.
-    pub is_cut: bool,
+    /// How many of the readings are done; fewer than there are where a pass was stopped.
+    pub done: usize,
 }
 
 impl Block<'_> {
