@@ -8,6 +8,8 @@ use super::material::{LobeTerm, Material, PerChannel};
 
 const FORMAT: &str = "goniofit-material";
 const VERSION: u64 = 1;
+/// Relative room for rounding at the ends of a parameter's range.
+const ROUNDING: f64 = 1e-9;
 
 /// Why a text is no material.
 #[derive(Debug, thiserror::Error)]
@@ -347,14 +349,17 @@ fn read_lobe(lobe: FileLobe, index: usize, channels: usize) -> Result<Option<Lob
     let mut shape = Vec::new();
     for parameter in parameters {
         let name = field(&format!("shape.{}", parameter.name));
+        let (least, most) = parameter.bounds;
+        // A fit at the end of its range may have been rounded beyond it.
+        let is_possible = |x: f64| (least * (1.0 - ROUNDING)..=most * (1.0 + ROUNDING)).contains(&x);
         let value = values.get(parameter.name).cloned().unwrap_or(Value::Null);
         let read = serde_json::from_value::<PerChannel<f64>>(value.clone()).ok().filter(|v| match v {
-            PerChannel::Shared(x) => x.is_finite() && *x >= 0.0,
-            PerChannel::Each(list) => list.len() == channels && list.iter().all(|x| x.is_finite() && *x >= 0.0),
+            PerChannel::Shared(x) => is_possible(*x),
+            PerChannel::Each(list) => list.len() == channels && list.iter().all(|x| is_possible(*x)),
         });
         shape.push(read.ok_or_else(|| MaterialError::Field {
             field: name,
-            expected: format!("a number ≥ 0, or {channels} of them"),
+            expected: format!("a number from {least} to {most:e}, or {channels} of them"),
             found: value.to_string(),
         })?);
     }
@@ -411,12 +416,23 @@ mod tests {
             ("312.5", "-1", "lobes[1].shape.exponent"),
             ("312.5", "\"sharp\"", "found \"sharp\""),
             ("312.5", "[1, 2, 3]", "lobes[1].shape.exponent"),
+            (
+                "312.5",
+                "1e9",
+                "lobes[1].shape.exponent: expected a number from 0.01 to 1e8, or 2 of them, found 1000000000.0",
+            ),
+            ("312.5", "1.0001e8", "lobes[1].shape.exponent"),
+            ("312.5", "[1, 1e9]", "lobes[1].shape.exponent"),
+            ("312.5", "1e-3", "lobes[1].shape.exponent"),
             ("\"channels\": [", "\"channels\": [\"b\",", "lobes[0].weight: expected 3 finite numbers"),
         ] {
             let wrong = text.replacen(from, to, 1);
             assert_ne!(wrong, text, "{from}");
             let error = Material::from_json(&wrong).expect_err(to).to_string();
             assert!(error.contains(says), "{error} lacks {says}");
+        }
+        for end in ["1e8", "1.000000000000001e8", "0.01"] {
+            assert!(Material::from_json(&text.replacen("312.5", end, 1)).is_ok(), "{end}");
         }
         assert!(Material::from_json("[]").is_err() && Material::from_json("").is_err());
     }

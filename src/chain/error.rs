@@ -92,6 +92,9 @@ pub enum ChainError {
         /// The scan.
         scan: String,
     },
+    /// A simulation with too many raw readings.
+    #[error("{0}")]
+    TooManyReadings(String),
     /// Two inputs that don't go together.
     #[error("{0}")]
     Mismatch(String),

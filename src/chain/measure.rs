@@ -6,8 +6,10 @@ use super::error::ChainError;
 use super::source::Source;
 use super::surrogate::Surrogate;
 use crate::brdf::{Brdf, Material};
-use crate::control::Control;
-use crate::gonio::{ACCURACY, Adaptive, Instrument, Job, Look, Raw, Reduction, Scan, Truth, adapt, reduce, simulate};
+use crate::control::{Control, Stop};
+use crate::gonio::{
+    ACCURACY, Adaptive, Instrument, Job, Look, Raw, Reduction, Scan, Truth, adapt, lit_rows, reduce, simulate, too_many,
+};
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
 
@@ -25,7 +27,7 @@ pub fn measure(
 ) -> Result<Measurement, ChainError> {
     if !instrument.is_plain() {
         let raw = measure_raw(name, source, instrument, scan, seed, control)?;
-        let mut measurement = reduced(name, &raw, instrument)?.measurement;
+        let mut measurement = reduced_until(name, &raw, instrument, control.stop)?.measurement;
         measurement.origin = format!("simulated, scan {scan}, seed {seed}");
         return Ok(measurement);
     }
@@ -86,6 +88,9 @@ pub fn with_job<T>(
     control: Control<'_>,
     work: impl FnOnce(&Job<'_>) -> T,
 ) -> Result<T, ChainError> {
+    if let Scan::Adaptive { pairs } = scan {
+        within(instrument, *pairs as usize)?;
+    }
     with_truth(name, source, scan, |truth, channels| {
         let (accuracy, left_out) = (ACCURACY, &[][..]);
         let look = |scan: &Scan, control: Control<'_>| {
@@ -97,8 +102,27 @@ pub fn with_job<T>(
         let scan = chosen(scan, source, instrument, control, look);
         let (directions, weights) = &scan.directions()?;
         let (dimension, rows) = (scan.dimension(), scan.rows());
-        Some(work(&Job { truth, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out }))
-    })
+        if let Err(error) = within(instrument, lit_rows(directions, rows).len()) {
+            return Some(Err(error));
+        }
+        Some(Ok(work(&Job {
+            truth,
+            channels,
+            instrument,
+            dimension,
+            directions,
+            weights,
+            rows,
+            seed,
+            accuracy,
+            left_out,
+        })))
+    })?
+}
+
+/// Refuses an instrument that makes too many raw readings of so many pairs of directions.
+fn within(instrument: &Instrument, pairs: usize) -> Result<(), ChainError> {
+    too_many(instrument, pairs).map_or(Ok(()), |said| Err(ChainError::TooManyReadings(said)))
 }
 
 /// Reduces raw readings. Where errors of positions matter, a fit of `lambert+phong+phong` to a first reduction, through the
@@ -107,19 +131,35 @@ pub fn with_job<T>(
 /// # Errors
 /// [`ChainError::Reduce`].
 pub fn reduced(name: &str, raw: &Raw, instrument: &Instrument) -> Result<Reduction, ChainError> {
+    reduced_until(name, raw, instrument, Control::silent().stop)
+}
+
+/// As [`reduced`]; once the work is stopped errors of positions are left out, as a note of the measurement says.
+///
+/// # Errors
+/// As [`reduced`].
+pub fn reduced_until(name: &str, raw: &Raw, instrument: &Instrument, stop: &Stop) -> Result<Reduction, ChainError> {
     let wrong = |source| ChainError::Reduce { name: name.to_owned(), source };
+    let told = |mut reduction: Reduction| {
+        reduction.measurement.notes.splice(0..0, raw.notes.iter().cloned());
+        reduction
+    };
     let first = reduce(name, raw, instrument, None).map_err(wrong)?;
-    if !instrument.has_positions() {
-        return Ok(first);
+    if !instrument.has_positions() || stop.requested() {
+        return Ok(told(first));
     }
     let Some(surrogate) = Surrogate::of(&first.measurement, instrument) else {
-        return Ok(first); // which says that there was no model
+        return Ok(told(first)); // which says that there was no model
     };
     let model = |wi, wo, out: &mut [f64]| {
+        if stop.requested() {
+            return false; // what comes of it is thrown away
+        }
         surrogate.write_value(wi, wo, out);
         true
     };
-    reduce(name, raw, instrument, Some(&model)).map_err(wrong)
+    let second = reduce(name, raw, instrument, Some(&model)).map_err(wrong)?;
+    Ok(told(if stop.requested() { first } else { second }))
 }
 
 /// What `work` makes of the material's values and channels; `None` from it is a scan that is too large.

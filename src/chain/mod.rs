@@ -21,7 +21,7 @@ pub use demo::{Demo, DemoFit, DemoOptions, demo};
 pub use error::ChainError;
 pub use gallery::{Gallery, Shown, write_gallery};
 pub use library::{BuiltInMaterial, MATERIALS};
-pub use measure::{measure, measure_raw, reduced, tabulate, with_job};
+pub use measure::{measure, measure_raw, reduced, reduced_until, tabulate, with_job};
 pub use pictures::{Stage, picture, picture_of};
 pub use scatter::{Scatter, integrated_scatter};
 pub use source::{Source, load, load_material, render_material, shown_channels};

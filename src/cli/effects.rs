@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::simulation::{Plan, What};
 use super::ui::Ui;
 use crate::chain;
-use crate::gonio::{Change, Contribution, Contributions};
+use crate::gonio::{ACCURACY, Change, Contribution, Contributions};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -25,6 +25,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let found = chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
         job.contributions(ui.control())
     })?;
+    if found.quadrature_error > ACCURACY {
+        let error = found.quadrature_error;
+        ui.warn(&format!(
+            "means over cones are good to {error:.1e} at worst, not to {ACCURACY:e}: their orders end there"
+        ));
+    }
     let object = json!({
         "material": plan.material, "scan": plan.scan.to_string(), "seed": plan.seed, "readings": found.readings,
         "seconds": found.seconds, "quadrature_error": found.quadrature_error, "effects": found.effects,

@@ -3,13 +3,13 @@
 use crate::chain::ChainError;
 use crate::fit::FitError;
 use crate::image::ImageError;
-use crate::measurement::MeasurementError;
+use crate::measurement::{MeasurementError, STOPPED};
 use crate::render::RenderError;
 
 /// Why a command failed.
 #[derive(Debug)]
 pub(super) struct Failure {
-    /// 1: the work failed; 2: the command line or an input file is wrong.
+    /// 1: the work failed; 2: the command line or an input file is wrong; 130: stopped.
     pub code: u8,
     /// What to tell the user.
     pub message: String,
@@ -26,6 +26,18 @@ impl Failure {
     /// The work failed.
     pub fn work(message: impl Into<String>) -> Self {
         Self { code: 1, message: message.into(), found: None }
+    }
+
+    /// The work was stopped before there was anything to show.
+    pub fn stopped(message: impl Into<String>) -> Self {
+        Self { code: 130, message: message.into(), found: None }
+    }
+
+    /// The same, of work that was asked to stop and so had no chance to succeed.
+    pub fn while_stopping(self) -> Self {
+        let is_said = self.message.starts_with(STOPPED.trim_end());
+        let message = if is_said { self.message } else { format!("stopped: {}", self.message) };
+        Self { code: 130, message, ..self }
     }
 
     /// With results that were found all the same, as text and as a JSON object.

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::failure::Failure;
-use super::output::read_text;
-use crate::gonio::{Instrument, PRESETS, Preset, SimulationSpec};
+use super::output::{input_name, read_text};
+use crate::gonio::{self, Instrument, PRESETS, Preset, SimulationSpec};
 
 /// The built-in instrument of this name, else the `[instrument]` of this simulation file (`-` is stdin).
 pub(super) fn read_instrument(text: &str) -> Result<Instrument, Failure> {
@@ -15,7 +15,13 @@ pub(super) fn read_instrument(text: &str) -> Result<Instrument, Failure> {
     if text != "-" && !path.exists() {
         return Err(unknown(text));
     }
-    Ok(read_spec(path)?.instrument)
+    let text = read_text(path)?;
+    // Raw readings may say what made them.
+    match gonio::described(Path::new(&input_name(path)), &text)? {
+        Some(instrument) => Ok(instrument),
+        None if is_table(&text) => Err(Failure::usage(format!("{}: {TABLE}", input_name(path)))),
+        None => Ok(spec_of(path, &text)?.instrument),
+    }
 }
 
 /// Nothing of this name is built in, nor is it a file.
@@ -28,9 +34,27 @@ pub(super) fn unknown(name: &str) -> Failure {
 
 /// A simulation file.
 pub(super) fn read_spec(path: &Path) -> Result<SimulationSpec, Failure> {
-    let text = read_text(path)?;
-    let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("{}: {e}", path.display()));
-    SimulationSpec::from_toml(&text).map_err(|e| if is_scene(&text) { wrong(&SCENE) } else { wrong(&e) })
+    if path != Path::new("-") && !path.exists() && path.to_str().and_then(Preset::find).is_some() {
+        let name = path.display();
+        return Err(Failure::usage(format!(
+            "{name}: there is no simulation file of this name; the built-in instrument is meant by --instrument {name}"
+        )));
+    }
+    spec_of(path, &read_text(path)?)
+}
+
+fn spec_of(path: &Path, text: &str) -> Result<SimulationSpec, Failure> {
+    let wrong = |e: &dyn std::fmt::Display| Failure::usage(format!("{}: {e}", input_name(path)));
+    SimulationSpec::from_toml(text).map_err(|e| if is_scene(text) { wrong(&SCENE) } else { wrong(&e) })
+}
+
+const TABLE: &str = "expected a simulation file with an [instrument], or raw readings that say what made them (`# instrument: {…}`), found a \
+                     table without that line";
+
+/// Whether the first line that is no comment is the header of a CSV.
+fn is_table(text: &str) -> bool {
+    let first = text.lines().find(|l| !l.trim().is_empty() && !l.starts_with('#'));
+    first.is_some_and(|l| l.contains(',') && !l.contains(['=', '[']))
 }
 
 const SCENE: &str = "expected a simulation file (version, material, scan, seed, [instrument]), found a scene";

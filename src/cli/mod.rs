@@ -116,6 +116,7 @@ pub fn main() -> ExitCode {
         Ok(()) if ui::lost_output() => ExitCode::from(1),
         Ok(()) if ui::stop().requested() => ExitCode::from(130),
         Ok(()) => ExitCode::SUCCESS,
+        Err(failure) if ui::stop().requested() => ui::report_failure(&failure.while_stopping(), cli.global.json),
         Err(failure) => ui::report_failure(&failure, cli.global.json),
     }
 }

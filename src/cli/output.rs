@@ -1,7 +1,7 @@
 //! Output files of the commands.
 
-use std::io::{self, Write};
-use std::path::Path;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
 
 use super::failure::Failure;
 use super::ui::Ui;
@@ -16,11 +16,43 @@ pub(super) fn stdout_is_free(out: &Path, ui: &Ui) -> Result<(), Failure> {
     Ok(())
 }
 
+/// What messages call an input.
+pub(super) fn input_name(path: &Path) -> String {
+    if path == Path::new("-") { "stdin".into() } else { path.display().to_string() }
+}
+
 /// The text of a file; `-` is stdin.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    let read =
-        if path == Path::new("-") { io::read_to_string(io::stdin().lock()) } else { std::fs::read_to_string(path) };
-    read.map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
+    let name = input_name(path);
+    if path != Path::new("-") && path.is_dir() {
+        return Err(Failure::usage(format!("{name}: expected a file, found a folder")));
+    }
+    let mut bytes = Vec::new();
+    let read = if path == Path::new("-") {
+        io::stdin().lock().read_to_end(&mut bytes).map(|_| ())
+    } else {
+        std::fs::read(path).map(|all| bytes = all)
+    };
+    read.map_err(|e| Failure::usage(format!("{name}: {e}")))?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let place = e.utf8_error().valid_up_to();
+        not_utf8(&name, place, e.as_bytes())
+    })?;
+    match text.find('\0') {
+        Some(place) => Err(not_utf8(&name, place, text.as_bytes())),
+        None => Ok(text),
+    }
+}
+
+/// An input that is no text in UTF-8 from byte `place` on, with what it may be instead.
+fn not_utf8(name: &str, place: usize, bytes: &[u8]) -> Failure {
+    let found = match bytes {
+        [0xff, 0xfe, ..] => "the mark of UTF-16, little-endian",
+        [0xfe, 0xff, ..] => "the mark of UTF-16, big-endian",
+        _ if bytes.contains(&0) => "bytes that are 0: UTF-16 without its mark, or no text",
+        _ => "a byte of another encoding, Windows-1252 or Latin-1 perhaps",
+    };
+    Failure::usage(format!("{name}, byte {place}: expected text in UTF-8, found {found}; save the file as UTF-8"))
 }
 
 /// Writes a text file whole, or to stdout for `-` (where a closed pipe is no error).
@@ -65,6 +97,39 @@ pub(super) fn keeps_inputs<'a>(
     }
 }
 
+/// Two outputs that are one file would leave only the second; each comes with the option that it was named by. What is no regular file
+/// (`/dev/null`) can be both, stdout can't.
+pub(super) fn distinct_outputs(first: (&str, &Path), second: (&str, &Path)) -> Result<(), Failure> {
+    let [a, b] = [first.1, second.1].map(target);
+    let is_device = std::fs::metadata(&a).is_ok_and(|m| !m.is_file());
+    if a != b || (is_device && a != Path::new("-")) {
+        return Ok(());
+    }
+    let what = if a == Path::new("-") { "stdout".to_owned() } else { first.1.display().to_string() };
+    Err(Failure::usage(format!(
+        "{}: {} would write over what {} writes to {what}; expected another name",
+        second.0,
+        second.1.display(),
+        first.0
+    )))
+}
+
+/// The file that a path leads to, whether it is there yet or not.
+fn target(path: &Path) -> PathBuf {
+    let mut path = path.to_path_buf();
+    if path == Path::new("-") {
+        return path;
+    }
+    // A link to a file that is not there yet; more than a few in a row go in circles.
+    for _ in 0..40 {
+        let Ok(link) = std::fs::read_link(&path) else { break };
+        path = path.parent().map_or_else(|| link.clone(), |folder| folder.join(&link));
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    let there = || Some(folder.canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(there).unwrap_or(path)
+}
+
 /// Makes a folder for outputs where there is none yet.
 pub(super) fn make_folder(option: &str, folder: &Path) -> Result<(), Failure> {
     match std::fs::create_dir_all(folder) {
@@ -101,6 +166,16 @@ pub(super) fn output_format(path: &Path, asked: Option<Format>) -> Result<Format
         None if path == Path::new("-") => Ok(Format::Csv),
         None => Format::from_extension(path).ok_or_else(known),
     }
+}
+
+/// What is always written as CSV has a name that says so, or goes to stdout.
+pub(super) fn is_csv(option: &str, path: &Path) -> Result<(), Failure> {
+    let right = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+    let device = std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
+    if right || device || path == Path::new("-") {
+        return Ok(());
+    }
+    Err(Failure::usage(format!("{option}: expected a name that ends in .csv, or -, found {}", path.display())))
 }
 
 enum WriteFailure {

@@ -8,12 +8,17 @@ use serde_json::json;
 use super::failure::Failure;
 use super::instrument::read_instrument;
 use super::output::{
-    check_folder, keeps_inputs, output_format, read_text, stdout_is_free, write_measurement, write_text,
+    check_folder, distinct_outputs, input_name, is_csv, keeps_inputs, output_format, read_text, stdout_is_free,
+    write_measurement, write_text,
 };
+use super::simulation::finish;
 use super::ui::Ui;
 use crate::chain;
-use crate::geometry::angles::{phi_of, theta_of};
-use crate::gonio::{Instrument, Raw, Reduction};
+use crate::chain::ChainError;
+use crate::control::counted;
+use crate::gonio::{Instrument, Line, Raw, Reduction};
+use crate::measurement::Dimension;
+use crate::measurement::formats::{flat_deg, push_number, spherical_deg};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -22,14 +27,14 @@ use crate::gonio::{Instrument, Raw, Reduction};
 pub(super) struct Args {
     /// Raw readings: a CSV with kind, time_s, exposure_s, repeat and signals (`-` is stdin)
     raw: PathBuf,
-    /// What made them: a built-in instrument (see `goniofit instruments`), or a simulation file whose [instrument] counts; else what
-    /// the raw file says of it
+    /// What made them: a built-in instrument (see `goniofit instruments`), a simulation file whose [instrument] counts, or other raw
+    /// readings that say what made them; else what this raw file says of it
     #[arg(long, value_name = "I")]
     instrument: Option<String>,
     /// Where to write the measurement; `-` is CSV on stdout
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Write what each component brings to each reading, as CSV
+    /// Write what each component brings to each reading, as CSV (`-` is stdout); angles and values are written as in --out
     #[arg(long, value_name = "BUDGET.csv")]
     budget: Option<PathBuf>,
 }
@@ -41,13 +46,22 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         let Some(out) = out else { continue };
         keeps_inputs(option, out, inputs())?;
         check_folder(out)?;
+        stdout_is_free(out, ui)?;
     }
-    stdout_is_free(&args.out, ui)?;
-    let (raw, told) = Raw::from_csv(&args.raw, &read_text(&args.raw)?)?;
+    if let Some(budget) = &args.budget {
+        distinct_outputs(("--out", &args.out), ("--budget", budget))?;
+        is_csv("--budget", budget)?;
+    }
+    let input = input_name(&args.raw);
+    let (raw, told) = Raw::from_csv(Path::new(&input), &read_text(&args.raw)?)?;
     let given = args.instrument.as_deref().map(read_instrument).transpose()?;
     let instrument = given.or(told).unwrap_or_else(Instrument::noiseless);
-    let name = args.raw.file_stem().map_or("reduced".into(), |s| s.to_string_lossy());
-    let reduction = chain::reduced(&name, &raw, &instrument)?;
+    let name = Path::new(&input).file_stem().map_or("reduced".into(), |s| s.to_string_lossy());
+    let reduction = chain::reduced_until(&name, &raw, &instrument, ui.control().stop).map_err(|error| match error {
+        // Messages call the file as it was typed.
+        ChainError::Reduce { source, .. } => ChainError::Reduce { name: input.clone(), source },
+        other => other,
+    })?;
     let table = &reduction.measurement;
     for note in &table.notes {
         ui.warn(note);
@@ -57,29 +71,37 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         write_text(path, &by_reading(&raw, &reduction))?;
     }
     let valid = table.values.len() as u64 - table.masked.total();
-    if args.out != Path::new("-") {
-        let object = json!({
+    let object = {
+        let lines: Vec<Line> = reduction.budget.lines.iter().map(unsigned).collect();
+        json!({
             "out": args.out, "budget_file": args.budget, "readings": raw.readings.len(), "entries": table.len(), "valid": valid,
-            "components": table.common.len(), "budget": reduction.budget.lines, "notes": table.notes,
-        });
-        ui.result(&summary(&args.out, &raw, &reduction, valid), &object);
-    }
-    Ok(())
+            "components": table.common.len(), "budget": lines, "notes": table.notes,
+        })
+    };
+    let text = summary(&args.out, &raw, &reduction, valid);
+    let outputs = [Some(args.out.as_path()), args.budget.as_deref()];
+    finish(table, Some(&raw), &instrument, (text, object), &outputs, ui)
+}
+
+/// Zero without a sign.
+fn unsigned(line: &Line) -> Line {
+    Line { rms: line.rms + 0.0, relative: line.relative + 0.0, ..line.clone() }
 }
 
 /// The budget as text.
 fn summary(out: &Path, raw: &Raw, reduction: &Reduction, valid: u64) -> String {
     let table = &reduction.measurement;
     let mut text = format!(
-        "{}: {} readings of {} pairs of directions, {valid} valid values, {} shared components",
+        "{}: {} of {} of directions, {}, {}",
         out.display(),
-        raw.readings.len(),
-        table.len(),
-        table.common.len()
+        counted(raw.readings.len() as u64, "reading"),
+        counted(table.len() as u64, "pair"),
+        counted(valid, "valid value"),
+        counted(table.common.len() as u64, "shared component")
     );
     // Writing to a String can't fail.
     let _ = write!(text, "\n  {:<34} type   rms [1/sr]   of a reading (median)", "component, one σ");
-    for line in &reduction.budget.lines {
+    for line in reduction.budget.lines.iter().map(unsigned) {
         let kind = if line.name == TOTAL { "" } else { line.kind.name() };
         let _ = write!(text, "\n  {:<34} {kind:<4} {:>12.3e}   {:>8.3} %", line.name, line.rms, 100.0 * line.relative);
     }
@@ -92,7 +114,9 @@ const TOTAL: &str = "all together";
 fn by_reading(raw: &Raw, reduction: &Reduction) -> String {
     let (table, lines) = (&reduction.measurement, &reduction.budget.lines);
     let parts = &lines[..lines.len() - 1];
-    let mut text = String::from("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,channel,value");
+    let is_flat = table.dimension == Dimension::Flat;
+    let angles = if is_flat { "theta_i_deg,theta_o_deg" } else { "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg" };
+    let mut text = format!("{angles},channel,value");
     for line in parts {
         let _ = write!(text, ",{} ({}) [1/sr]", line.name, line.kind.name());
     }
@@ -101,15 +125,21 @@ fn by_reading(raw: &Raw, reduction: &Reduction) -> String {
         let (wi, wo) = raw.directions.pair(i);
         for (c, channel) in table.channels.iter().enumerate() {
             let Some(value) = table.value(c, i) else { continue };
-            let degrees =
-                [theta_of(wi), phi_of(wi), theta_of(wo), phi_of(wo)].map(|a| format!("{:.6}", a.to_degrees()));
-            let _ = write!(text, "{},{channel},{value:e}", degrees.join(","));
+            // The same text as in the measurement's own file.
+            if is_flat {
+                [wi, wo].into_iter().for_each(|w| push_number(&mut text, flat_deg(w)));
+            } else {
+                [spherical_deg(wi), spherical_deg(wo)].into_iter().flatten().for_each(|a| push_number(&mut text, a));
+            }
+            let _ = write!(text, "{channel},");
+            push_number(&mut text, value);
             let place = c * table.len() + i;
-            let of: Vec<f64> = (0..parts.len()).map(|k| reduction.budget.contribution(k, place)).collect();
-            of.iter().for_each(|u| {
-                let _ = write!(text, ",{u:e}");
-            });
-            let _ = writeln!(text, ",{:e}", of.iter().map(|u| u * u).sum::<f64>().sqrt());
+            // Adding 0 takes the sign of −0.
+            let of: Vec<f64> = (0..parts.len()).map(|k| reduction.budget.contribution(k, place) + 0.0).collect();
+            of.iter().for_each(|u| push_number(&mut text, *u));
+            push_number(&mut text, of.iter().map(|u| u * u).fold(0.0, |a, b| a + b).sqrt());
+            text.pop(); // the last comma
+            text.push('\n');
         }
     }
     text

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::failure::Failure;
-use super::output::{check_folder, keeps_inputs, read_text, stdout_is_free, write_bytes};
+use super::output::{check_folder, distinct_outputs, keeps_inputs, read_text, stdout_is_free, write_bytes};
 use super::ui::{self, Ui};
 use crate::chain::{self, Stage};
 use crate::image::{Image, LayerKind, develop, encode_exr, encode_png, exposure_for};
@@ -120,6 +120,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         check_extension(png, "png", "--png")?;
         check_folder(png)?;
         stdout_is_free(png, ui)?;
+        distinct_outputs(("--out", &args.out), ("--png", png))?;
     }
     let options = Options { layers: LayerSet::of(&args.layers), ..args.picture.options(&stage) };
     let image = match &args.material {

@@ -7,11 +7,14 @@ use std::time::Duration;
 use serde_json::json;
 
 use super::failure::Failure;
-use super::fit::{parse_share, parse_time};
-use super::output::{check_folder, keeps_inputs, output_format, stdout_is_free, write_measurement, write_text};
-use super::simulation::{Plan, What};
+use super::fit::{parse_time, parse_tolerance};
+use super::output::{
+    check_folder, distinct_outputs, keeps_inputs, output_format, stdout_is_free, write_measurement, write_text,
+};
+use super::simulation::{Plan, What, finish};
 use super::ui::{Ui, significant};
 use crate::chain;
+use crate::control::counted;
 use crate::gonio::{self, Affordable, Job, Raw, Scan, Spared};
 use crate::measurement::Measurement;
 
@@ -25,14 +28,14 @@ use crate::measurement::Measurement;
 pub(super) struct Args {
     #[command(flatten)]
     what: What,
-    /// Write the raw readings too, as CSV
+    /// Write the raw readings too, as CSV (`-` is stdout); Ctrl-C ends with what was read so far
     #[arg(long, value_name = "RAW.csv")]
     raw: Option<PathBuf>,
-    /// Leave out effects that change readings of the sample by less than this relative tolerance, all together, noise counted by its σ
-    #[arg(long, value_name = "TOL", value_parser = parse_share)]
+    /// Leave out effects that change readings of the sample by less than this relative tolerance (below 1), all together, noise counted by its σ
+    #[arg(long, value_name = "TOL", value_parser = parse_tolerance)]
     auto: Option<f64>,
     /// Relative error that means over the cones of source and aperture may have [default: 1e-6]
-    #[arg(long, value_name = "E", value_parser = parse_share, conflicts_with = "time_budget")]
+    #[arg(long, value_name = "E", value_parser = parse_tolerance, conflicts_with = "time_budget")]
     target_error: Option<f64>,
     /// Time for the readings (50ms, 2s, 1m): means over cones are as good as fits into it
     #[arg(long, value_name = "T", value_parser = parse_time)]
@@ -47,33 +50,43 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     check_folder(&args.out)?;
     if let Some(raw) = &args.raw {
         check_folder(raw)?;
-        let inputs = [args.what.spec.as_deref(), args.what.instrument.as_deref().map(Path::new), Some(&args.out)];
+        distinct_outputs(("--out", &args.out), ("--raw", raw))?;
+        let inputs = [args.what.spec.as_deref(), args.what.instrument.as_deref().map(Path::new)];
         keeps_inputs("--raw", raw, inputs.into_iter().flatten())?;
+        stdout_is_free(raw, ui)?;
     }
+    keeps_inputs("--out", &args.out, args.what.instrument.as_deref().map(Path::new))?;
     stdout_is_free(&args.out, ui)?;
     let plan = Plan::new(&args.what, Some(&args.out))?;
     let (source, name) = plan.load()?;
-    let (table, how) = if args.raw.is_none() && args.auto.is_none() && plan.instrument.is_plain() {
+    for said in gonio::idle(&plan.instrument, source.channels()) {
+        ui.warn(&said);
+    }
+    let (mut table, raw, how) = if args.raw.is_none() && args.auto.is_none() && plan.instrument.is_plain() {
         let table = chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
-        (table, How::default())
+        (table, None, How::default())
     } else {
         let (raw, how) =
             chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
                 read(job, args, ui)
             })?;
+        if let Some(note) = raw.notes.first().filter(|_| raw.readings.iter().all(|r| r.entry.is_none())) {
+            return Err(Failure::stopped(format!("{note}: nothing is written")));
+        }
         if let Some(path) = &args.raw {
             write_text(path, &raw.to_csv(&plan.instrument))?;
         }
-        let mut table = chain::reduced(&name, &raw, &plan.instrument)?.measurement;
+        let mut table = chain::reduced_until(&name, &raw, &plan.instrument, ui.control().stop)?.measurement;
         if args.raw.is_none() {
             table.origin = format!("simulated, scan {}, seed {}", plan.scan, plan.seed);
         }
-        (table, how)
+        (table, Some(raw), how)
     };
+    table.notes.extend(below_horizon(&plan.scan, &table));
     for note in &table.notes {
         ui.warn(note);
     }
-    how.warn(args, ui);
+    how.warn(ui);
     if let Scan::Adaptive { pairs } = plan.scan
         && table.len() < pairs as usize
         && !ui.control().stop.requested()
@@ -86,10 +99,18 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ));
     }
     write_measurement(&table, &args.out, format, ui)?;
-    if args.out.as_os_str() != "-" {
-        report(args, &plan, &table, &how, ui);
-    }
-    Ok(())
+    let result = report(args, &plan, &table, raw.as_ref(), &how);
+    let outputs = [Some(args.out.as_path()), args.raw.as_deref()];
+    finish(&table, raw.as_ref(), &plan.instrument, result, &outputs, ui)
+}
+
+/// Says how many directions of a list can't be measured.
+fn below_horizon(scan: &Scan, table: &Measurement) -> Option<String> {
+    let below = (table.len() - gonio::lit_rows(&table.directions, &[]).len()) as u64;
+    let pairs = counted(below, "pair");
+    let are = if below == 1 { "is" } else { "are" };
+    (below > 0 && matches!(scan, Scan::List { .. }))
+        .then(|| format!("{pairs} of directions {are} masked: at or below the horizon"))
 }
 
 /// How readings were made.
@@ -97,8 +118,9 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 struct How {
     spared: Vec<Spared>,
     affordable: Option<Affordable>,
-    /// Largest error of a mean over cones.
+    /// Largest error of a mean over cones, and what it may be.
     error: f64,
+    accuracy: f64,
 }
 
 /// Reads, with the accuracy and the effects that were asked for.
@@ -115,16 +137,16 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     let accuracy = affordable.map_or(job.accuracy, |a| a.accuracy);
     let raw = Job { accuracy, ..job }.run(ui.control());
     let error = raw.quadrature_error;
-    (raw, How { spared, affordable, error })
+    (raw, How { spared, affordable, error, accuracy })
 }
 
 impl How {
     /// Says where what was asked for could not be reached.
-    fn warn(&self, args: &Args, ui: &Ui) {
-        if let Some(target) = args.target_error.filter(|target| self.error > *target) {
+    fn warn(&self, ui: &Ui) {
+        if self.error > self.accuracy {
             ui.warn(&format!(
-                "means over cones are good to {:.1e} at worst, not to {target:e}: their orders end there",
-                self.error
+                "means over cones are good to {:.1e} at worst, not to {:e}: their orders end there",
+                self.error, self.accuracy
             ));
         }
         if let Some(Affordable { predicted_s, .. }) = self.affordable.filter(|a| !a.fits) {
@@ -135,7 +157,7 @@ impl How {
     }
 }
 
-fn report(args: &Args, plan: &Plan, table: &Measurement, how: &How, ui: &Ui) {
+fn report(args: &Args, plan: &Plan, table: &Measurement, raw: Option<&Raw>, how: &How) -> (String, serde_json::Value) {
     let valid = table.values.len() as u64 - table.masked.total();
     let mut effects = gonio::plan(&plan.instrument, &table.channels).effects;
     for spared in &how.spared {
@@ -144,13 +166,20 @@ fn report(args: &Args, plan: &Plan, table: &Measurement, how: &How, ui: &Ui) {
             e.why = format!("changes readings by {:.1e} at most", spared.bound);
         });
     }
-    let hours =
-        gonio::hours(&plan.instrument, &table.directions, &gonio::lit_rows(&table.directions, plan.scan.rows()));
+    // Of a run that was stopped those that it took.
+    let stopped = raw.filter(|raw| !raw.notes.is_empty()).and_then(|raw| raw.readings.last());
+    let hours = match stopped {
+        Some(last) => (last.time_s + last.exposure_s) / 3600.0,
+        None => {
+            gonio::hours(&plan.instrument, &table.directions, &gonio::lit_rows(&table.directions, plan.scan.rows()))
+        }
+    };
     let on: Vec<&str> = effects.iter().filter(|e| e.on).map(|e| e.name).collect();
     let mut text = format!(
-        "{}: {} direction pairs, {valid} valid values, scan {}, seed {}, {} h of the instrument; effects: {}",
+        "{}: {}, {}, scan {}, seed {}, {} h of the instrument; effects: {}",
         args.out.display(),
-        table.len(),
+        counted(table.len() as u64, "direction pair"),
+        counted(valid, "valid value"),
         plan.scan,
         plan.seed,
         significant(hours),
@@ -166,6 +195,7 @@ fn report(args: &Args, plan: &Plan, table: &Measurement, how: &How, ui: &Ui) {
     let object = json!({
         "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed, "instrument_hours": hours,
         "effects": effects, "left_out": how.spared, "quadrature_error": how.error, "time_budget": how.affordable,
+        "notes": table.notes,
     });
-    ui.result(&text, &object);
+    (text, object)
 }

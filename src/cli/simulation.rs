@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use super::failure::Failure;
 use super::instrument::{read_instrument, read_spec};
 use super::output::keeps_inputs;
+use super::ui::Ui;
 use crate::chain::{self, Source};
-use crate::gonio::{Instrument, Scan, SimulationSpec};
-use crate::measurement::{ReadOptions, formats};
+use crate::control::counted;
+use crate::gonio::{Instrument, Raw, Scan, SimulationSpec};
+use crate::measurement::{Measurement, ReadOptions, formats};
 
 /// Options that say what is simulated.
 #[derive(Debug, clap::Args)]
@@ -25,11 +27,11 @@ pub(super) struct What {
     /// Seed of the noise [default: 0]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// The instrument: a built-in one (see `goniofit instruments`), or a simulation file whose [instrument] counts (see
-    /// docs/instrument.md)
+    /// The instrument: a built-in one (see `goniofit instruments`), a simulation file whose [instrument] counts (see
+    /// docs/instrument.md), or raw readings that say what made them
     #[arg(long, value_name = "I")]
     pub instrument: Option<String>,
-    /// Photoelectrons in a reading of 1/sr at cosθo = 1 [default: 100000]; 0 is a detector without any noise
+    /// Photoelectrons in a reading of 1/sr at cosθo = 1, 1e-3 to 1e15 [default: 100000]; 0 is a detector without any noise
     #[arg(long, value_name = "E", allow_negative_numbers = true)]
     pub electrons: Option<f64>,
     /// Read noise, electrons [default: 10]
@@ -72,8 +74,8 @@ impl Plan {
         let scan = match (&what.scan, of_spec.and_then(|s| s.scan.as_ref())) {
             (Some(typed), _) => Some(typed.clone()),
             (None, Some(written)) => Some(match written.strip_prefix("list:") {
-                Some(file) => format!("list:{}", relative_to(base, file)),
-                None => written.clone(),
+                Some(file) if !file.is_empty() => format!("list:{}", relative_to(base, file)),
+                _ => written.clone(),
             }),
             (None, None) => None,
         };
@@ -115,8 +117,46 @@ fn relative_to(base: &Path, name: &str) -> String {
 /// A scan as typed; `list:FILE` takes the directions and weights of that measurement.
 pub(super) fn parse_scan(text: &str) -> Result<Scan, Failure> {
     if let Some(file) = text.strip_prefix("list:") {
+        if file.is_empty() {
+            return Err(Failure::usage(
+                "scan \"list:\": expected list:FILE, FILE being a CSV or another measurement with the directions, found no name",
+            ));
+        }
         let (directions, weights, dimension) = formats::read_directions(Path::new(file), &ReadOptions::default())?;
         return Ok(Scan::List { name: file.into(), directions, weights, dimension, rows: Vec::new() });
     }
     text.parse().map_err(|e: crate::gonio::ScanError| Failure::usage(e.to_string()))
+}
+
+/// The end of a command that wrote the measurement `table`, made from `raw` where that is at hand: its result, unless an output has stdout. A
+/// measurement without any valid value is a failure, for whose reason it says what is known.
+pub(super) fn finish(
+    table: &Measurement,
+    raw: Option<&Raw>,
+    instrument: &Instrument,
+    result: (String, serde_json::Value),
+    outputs: &[Option<&Path>],
+    ui: &Ui,
+) -> Result<(), Failure> {
+    let is_stdout_free = outputs.iter().flatten().all(|out| *out != Path::new("-"));
+    let values = table.values.len() as u64;
+    if table.masked.total() < values || ui.control().stop.requested() {
+        if is_stdout_free {
+            ui.result(&result.0, &result.1);
+        }
+        return Ok(());
+    }
+    let mut reasons = table.notes.clone();
+    if raw.is_some_and(|raw| raw.reference_saturates(instrument)) {
+        reasons.push("every exposure of the reference saturates".into());
+    }
+    if reasons.is_empty() {
+        reasons.push("the material is known in none of these directions".into());
+    }
+    let failure = Failure::work(format!(
+        "none of {} is valid: {}; the file says where (empty cells)",
+        counted(values, "value"),
+        reasons.join("; ")
+    ));
+    Err(if is_stdout_free { failure.beside(result.0, result.1) } else { failure })
 }

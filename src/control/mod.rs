@@ -54,6 +54,12 @@ impl Stop {
     }
 }
 
+/// "1 pair", "2 pairs".
+#[must_use]
+pub fn counted(count: u64, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 /// How long work talks to its caller: where progress goes, and whether to stop.
 #[derive(Clone, Copy)]
 pub struct Control<'a> {

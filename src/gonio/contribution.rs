@@ -9,12 +9,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::actual::Actual;
-use super::effects::{self, Block, EXPOSURE, LIGHT, NOISE, Step, quantisation};
+use super::effects::{self, Block, EXPOSURE, LIGHT, Maker, NOISE, Step, quantisation};
 use super::forward::Job;
 use super::raw::Raw;
 use super::reading::{Kind, Reading};
 use super::reduce::reduce;
-use crate::control::Control;
+use crate::control::{Control, Stop};
 use crate::numeric::sum::BLOCK;
 
 /// A relative change over readings, 0 to 1.
@@ -69,7 +69,7 @@ impl Job<'_> {
     #[must_use]
     pub fn contributions(&self, control: Control<'_>) -> Contributions {
         let (readings, actual) = self.prepare();
-        Study::new(self, &readings, &actual).contributions(control)
+        Study::new(self, &readings, &actual, Control::silent().stop).contributions(control)
     }
 }
 
@@ -78,6 +78,7 @@ pub(super) struct Study<'a> {
     job: &'a Job<'a>,
     readings: &'a [Reading],
     actual: &'a Actual,
+    stop: &'a Stop,
     fresh: Vec<Block<'a>>,
     lit: Vec<Block<'a>>,
     /// Electrons before the detector.
@@ -89,11 +90,12 @@ pub(super) struct Study<'a> {
 }
 
 impl<'a> Study<'a> {
-    pub fn new(job: &'a Job<'a>, readings: &'a [Reading], actual: &'a Actual) -> Self {
+    /// Once `stop` is requested what it says means nothing.
+    pub fn new(job: &'a Job<'a>, readings: &'a [Reading], actual: &'a Actual, stop: &'a Stop) -> Self {
         let range = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(readings.len());
         let block = |b: usize| job.block(&readings[range(b)], b * BLOCK);
         let fresh: Vec<Block<'a>> = (0..readings.len().div_ceil(BLOCK)).map(block).collect();
-        let maker = job.maker(actual);
+        let maker = Maker { stop, ..job.maker(actual) };
         let all = effects::passes(&maker, job.left_out);
         let (lit, mut times) = apply(&fresh, &all[..after(&all, LIGHT)]);
         times.extend(apply(&lit, &all[after(&all, LIGHT)..]).1);
@@ -102,7 +104,7 @@ impl<'a> Study<'a> {
         let (base, _) = apply(&exposed, &quiet[after(&quiet, EXPOSURE)..]);
         let quadrature_error = worst(&lit);
         let (exposed, base) = (joined(&exposed), joined(&base));
-        Self { job, readings, actual, fresh, lit, exposed, base, times, quadrature_error }
+        Self { job, readings, actual, stop, fresh, lit, exposed, base, times, quadrature_error }
     }
 
     pub fn contributions(&self, control: Control<'_>) -> Contributions {
@@ -150,7 +152,7 @@ impl<'a> Study<'a> {
     /// Readings without noise and without these effects, the seconds of their light, and the error of their means over cones.
     pub fn without(&self, names: &[&str]) -> (Vec<f64>, f64, f64) {
         let left_out = [self.job.left_out, &NOISE[..], names].concat();
-        let maker = self.job.maker(self.actual);
+        let maker = Maker { stop: self.stop, ..self.job.maker(self.actual) };
         let steps = effects::passes(&maker, &left_out);
         let anew = names.iter().any(|name| effects::turns_light(name));
         let (from, first) = if anew { (&self.fresh, 0) } else { (&self.lit, after(&steps, LIGHT)) };

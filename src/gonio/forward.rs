@@ -1,5 +1,8 @@
 //! The forward simulation: a truth, an instrument and directions to raw readings.
 
+use std::collections::HashSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -9,10 +12,11 @@ use super::effects::{self, Block, Maker};
 use super::instrument::Instrument;
 use super::raw::Raw;
 use super::reading::{Kind, Reading};
+use super::scan::kept_weights;
 use super::series::series;
 use super::simulate::Truth;
-use crate::control::Control;
-use crate::measurement::{Dimension, Directions, Weights};
+use crate::control::{Control, counted};
+use crate::measurement::{Dimension, Directions, STOPPED, Weights};
 use crate::numeric::sum::BLOCK;
 
 /// What is to be read, and how.
@@ -68,37 +72,54 @@ impl Job<'_> {
         (readings, actual)
     }
 
-    /// Reads everything by an instrument with the errors `actual`.
+    /// Reads everything by an instrument with the errors `actual`. Where the work is stopped what comes back is the beginning of the run, up to the last
+    /// pair of directions after a whole visit, and a note says so.
     #[must_use]
-    pub fn read(&self, readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
-        let passes = effects::passes(&self.maker(actual), self.left_out);
+    pub fn read(&self, mut readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
+        let passes = effects::passes(&Maker { stop: control.stop, ..self.maker(actual) }, self.left_out);
         let (n, width) = (readings.len(), self.channels.len());
         control.progress.start("reading", n as u64);
-        let blocks: Vec<(Vec<f64>, f64)> = (0..n.div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|b| {
-                let range = b * BLOCK..((b + 1) * BLOCK).min(n);
-                let mut block = self.block(&readings[range.clone()], range.start);
-                if control.stop.requested() {
-                    block.signal.fill(f64::NAN); // not read
-                } else {
-                    passes.iter().for_each(|step| step.pass.apply(&mut block));
+        let next = AtomicUsize::new(0);
+        // Blocks are taken in order of time, so that what is read before a stop has no holes.
+        let worker = |_| {
+            let mut done = Vec::new();
+            while !control.stop.requested() {
+                let b = next.fetch_add(1, Ordering::Relaxed);
+                let range = b.saturating_mul(BLOCK).min(n)..(b + 1).saturating_mul(BLOCK).min(n);
+                if range.is_empty() {
+                    break;
                 }
-                control.progress.advance(range.len() as u64);
-                (block.signal, block.error)
-            })
-            .collect();
+                let mut block = self.block(&readings[range.clone()], range.start);
+                passes.iter().for_each(|step| step.pass.apply(&mut block));
+                control.progress.advance(block.done as u64);
+                done.push((b, block.done, block.signal, block.error));
+            }
+            done
+        };
+        let workers = 0..rayon::current_num_threads().max(1);
+        let mut blocks: Vec<(usize, usize, Vec<f64>, f64)> =
+            workers.into_par_iter().with_max_len(1).flat_map_iter(worker).collect();
         control.progress.finish();
-        let quadrature_error = blocks.iter().map(|b| b.1).fold(0.0, f64::max);
-        let mut signal = Vec::with_capacity(n * width);
-        blocks.into_iter().for_each(|(part, _)| signal.extend(part));
-        self.raw(readings, signal, quadrature_error)
+        blocks.sort_unstable_by_key(|(b, ..)| *b);
+        // Up to the first block that is missing, and with the first that is not whole.
+        let whole = blocks.iter().enumerate().take_while(|(k, (b, done, ..))| k == b && *done == BLOCK).count();
+        let part = blocks.get(whole).filter(|(b, ..)| *b == whole).map_or(0, |(_, done, ..)| *done);
+        blocks.truncate(whole + usize::from(part > 0));
+        let quadrature_error = blocks.iter().map(|b| b.3).fold(0.0, f64::max);
+        let (kept, note) = ended(&readings, whole * BLOCK + part);
+        let mut signal = Vec::with_capacity(kept * width);
+        blocks.into_iter().for_each(|(.., part, _)| signal.extend(part));
+        readings.truncate(kept);
+        signal.truncate(kept * width);
+        let raw = self.raw(readings, signal, quadrature_error);
+        if note.is_none() { raw } else { Raw { notes: note.into_iter().collect(), ..of_what_was_read(raw) } }
     }
 
     /// What passes are made from.
     pub(super) fn maker<'b>(&'b self, actual: &'b Actual) -> Maker<'b> {
         let Self { truth, channels, instrument, seed, accuracy, dimension, .. } = *self;
-        Maker { instrument, dimension, channels, actual, truth, seed, accuracy }
+        let stop = Control::silent().stop;
+        Maker { instrument, dimension, channels, actual, truth, seed, accuracy, stop }
     }
 
     /// Readings with these signals.
@@ -111,6 +132,7 @@ impl Job<'_> {
             readings,
             signal,
             quadrature_error,
+            notes: Vec::new(),
         }
     }
 
@@ -123,6 +145,42 @@ impl Job<'_> {
         };
         let (wi, wo) = readings.iter().map(pair).unzip();
         let width = self.channels.len();
-        Block { first, readings, wi, wo, width, signal: vec![1.0; readings.len() * width], error: 0.0 }
+        Block {
+            first,
+            readings,
+            wi,
+            wo,
+            width,
+            signal: vec![1.0; readings.len() * width],
+            error: 0.0,
+            done: readings.len(),
+        }
     }
+}
+
+/// Without the listed pairs of directions that no reading belongs to; a grid stays whole.
+fn of_what_was_read(mut raw: Raw) -> Raw {
+    let Directions::List { wi, wo } = &raw.directions else { return raw };
+    let mut place = vec![None; wi.len()];
+    raw.readings.iter().filter_map(|r| r.entry).for_each(|entry| place[entry as usize] = Some(0));
+    let kept: Vec<usize> = (0..place.len()).filter(|i| place[*i].is_some()).collect();
+    kept.iter().zip(0..).for_each(|(i, new)| place[*i] = Some(new));
+    let of = |list: &[DVec3]| kept.iter().map(|&i| list[i]).collect();
+    raw.directions = Directions::List { wi: of(wi), wo: of(wo) };
+    raw.weights = kept_weights(raw.weights, &kept);
+    raw.readings.iter_mut().for_each(|r| r.entry = r.entry.and_then(|entry| place[entry as usize]));
+    raw
+}
+
+/// How many of the first `read` readings count, and what to say where that is not all: a visit that was not finished says too little of what it is
+/// for.
+fn ended(readings: &[Reading], read: usize) -> (usize, Option<String>) {
+    let Some(next) = readings.get(read) else { return (read, None) };
+    let last = || readings[..read].iter().rposition(|r| r.kind == Kind::Sample).map_or(0, |last| last + 1);
+    let kept = if next.kind == Kind::Sample && read > 0 { read } else { last() };
+    let (before, after) = readings.split_at(kept);
+    let seen: HashSet<u32> = before.iter().filter_map(|r| r.entry).collect();
+    let missed: HashSet<u32> = after.iter().filter_map(|r| r.entry).filter(|e| !seen.contains(e)).collect();
+    let (pairs, all) = (counted(missed.len() as u64, "pair"), readings.len());
+    (kept, Some(format!("{STOPPED}{kept} of {all} readings: {pairs} of directions not read")))
 }

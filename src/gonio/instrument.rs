@@ -2,9 +2,12 @@
 
 use rand_distr::{Distribution, Normal, Poisson};
 
-use super::parts::{Axes, Detector, Holder, Protocol, Reference, Source, Surroundings};
+use super::parts::{Axes, Detector, Holder, Protocol, Reference, Source, Surroundings, shown};
 use super::reduce::positions;
 use crate::numeric::random::{Purpose, stream};
+
+/// Standard uncertainty of the sample's height over the distance of source or detector, at most.
+const HIGHEST: f64 = 0.1;
 
 /// A gonioreflectometer. As it stands by default it is ideal but for a noisy detector; parts that are described bring their effects
 /// (`docs/instrument.md`).
@@ -72,8 +75,8 @@ impl Instrument {
     #[must_use]
     pub fn fault(&self) -> Option<String> {
         let said = |name: &str, range: &str, found: f64| Some(format!("{name}: expected {range}, found {found:e}"));
-        if !(self.electrons >= 0.0 && self.electrons <= 1e15) {
-            return said("instrument.electrons", "a number from 0 (no noise) to 1e15", self.electrons);
+        if self.electrons != 0.0 && !(1e-3..=1e15).contains(&self.electrons) {
+            return said("instrument.electrons", "0 (no noise) or a number from 1e-3 to 1e15", self.electrons);
         }
         if !(self.read_noise >= 0.0 && self.read_noise <= 1e15) {
             return said("instrument.read_noise", "a number from 0 to 1e15", self.read_noise);
@@ -93,8 +96,21 @@ impl Instrument {
             self.axes.fault(),
             self.surroundings.fault(),
             self.protocol.fault(),
+            self.height_fault(),
         ];
         none().or_else(|| parts.into_iter().flatten().next())
+    }
+
+    /// A height of the surface that is no small part of the shortest distance would put it into source or detector.
+    fn height_fault(&self) -> Option<String> {
+        let height = self.sample.height_u_m;
+        let far = [("source", self.source.distance_m), ("detector", self.detector.distance_m)];
+        let (part, distance) = far.into_iter().find(|(_, distance)| *distance > 0.0 && height > HIGHEST * distance)?;
+        Some(format!(
+            "instrument.sample.height_u_m: expected a tenth of instrument.{part}.distance_m = {} at most, found {}",
+            shown(distance),
+            shown(height)
+        ))
     }
 
     /// Whether nothing but the detector's noise is described, so that no raw readings are needed to know what comes back.
@@ -166,6 +182,8 @@ pub(super) fn normal(seed: u64, index: u64) -> f64 {
 mod tests {
     use super::*;
 
+    type Change = fn(&mut Instrument);
+
     #[test]
     fn readings_scatter_round_the_truth_by_the_sigma_they_state() {
         for (f, electrons, readings) in
@@ -198,5 +216,49 @@ mod tests {
         assert_eq!(Instrument::default().fault(), None);
         let wrong = Instrument { read_noise: -1.0, ..Instrument::default() };
         assert!(wrong.fault().is_some_and(|f| f.contains("read_noise") && f.contains("-1e0")));
+        let of = |change: fn(&mut Instrument)| {
+            let mut instrument = Instrument::default();
+            change(&mut instrument);
+            instrument.fault().unwrap_or_default()
+        };
+        let cases: [(Change, &str); 10] = [
+            (
+                |i| i.electrons = 1e-300,
+                "instrument.electrons: expected 0 (no noise) or a number from 1e-3 to 1e15, found 1e-300",
+            ),
+            (|i| i.electrons = f64::NAN, "found NaN"),
+            (
+                |i| i.reference.reflectance = 2.0,
+                "instrument.reference.reflectance: expected a number from 0 to 1.2, found 2",
+            ),
+            (
+                |i| (i.sample.height_u_m, i.detector.distance_m) = (1.0, 0.5),
+                "a tenth of instrument.detector.distance_m = 0.5 at most, found 1",
+            ),
+            (
+                |i| i.sample.diameter_m = 1e-200,
+                "expected 0 (it catches every beam) or a number from 1e-6 to 100, found 1e-200",
+            ),
+            (
+                |i| i.source.distance_m = 1e-9,
+                "expected 0 (a collimated beam) or a number from 0.001 to 1e6, found 1e-9",
+            ),
+            (|i| i.source.beam_diameter_m = -1.0, "instrument.source.beam_diameter_m"),
+            (
+                |i| i.detector.full_well = 1e-9,
+                "instrument.detector.full_well: expected 0 (never saturates) or a number from 1 to 1e18",
+            ),
+            (
+                |i| i.detector.nonlinearity_u = 0.3,
+                "instrument.detector.nonlinearity_u: expected a number from 0 to 0.2",
+            ),
+            (
+                |i| i.detector.exposures_s = vec![1e-12],
+                "one or more times from 1e-9 to 1e6 s, ascending, found [1e-12]",
+            ),
+        ];
+        for (change, says) in cases {
+            assert!(of(change).contains(says), "{} lacks {says}", of(change));
+        }
     }
 }

@@ -3,8 +3,11 @@
 //! Sizes are what the experimenter knows. Errors (`*_u…`) are standard uncertainties of what nobody knows: each simulated instrument has its own
 //! draw from a normal distribution of that σ (GUM type B), the same in all its readings.
 
-/// Seconds of the detector's shortest useful exposure, and metres of its shortest distance.
+/// Seconds of the detector's shortest useful exposure.
 const LEAST: f64 = 1e-9;
+/// Metres of the smallest diameter and of the shortest distance.
+const NARROWEST_M: f64 = 1e-6;
+const NEAREST_M: f64 = 1e-3;
 /// Degrees a second of the slowest axis: half a turn takes two days.
 const SLOWEST: f64 = 1e-3;
 
@@ -150,8 +153,23 @@ impl Default for Protocol {
 fn check(part: &str, numbers: &[(&str, f64, f64)]) -> Option<String> {
     let wrong = |(_, value, most): &&(&str, f64, f64)| !(0.0..=*most).contains(value);
     numbers.iter().find(wrong).map(|(name, value, most)| {
-        format!("instrument.{part}.{name}: expected a number from 0 to {most}, found {value}")
+        format!("instrument.{part}.{name}: expected a number from 0 to {}, found {}", shown(*most), shown(*value))
     })
+}
+
+/// Says what is wrong with the first number that is neither 0, which means `none`, nor from the least to the most.
+fn check_or_none(part: &str, numbers: &[(&str, f64, f64, f64)], none: &str) -> Option<String> {
+    let wrong = |(_, value, least, most): &&(&str, f64, f64, f64)| *value != 0.0 && !(*least..=*most).contains(value);
+    numbers.iter().find(wrong).map(|(name, value, least, most)| {
+        let [least, most, value] = [least, most, value].map(|x| shown(*x));
+        format!("instrument.{part}.{name}: expected 0 ({none}) or a number from {least} to {most}, found {value}")
+    })
+}
+
+/// A number in a message, with an exponent where its plain form is long.
+pub(super) fn shown(x: f64) -> String {
+    let plain = x == 0.0 || (1e-4..1e6).contains(&x.abs()) || !x.is_finite();
+    if plain { format!("{x}") } else { format!("{x:e}") }
 }
 
 impl Source {
@@ -165,16 +183,17 @@ impl Source {
     #[must_use]
     pub fn fault(&self) -> Option<String> {
         let Self { divergence_deg, beam_diameter_m, distance_m, bandwidth_nm, drift_per_sqrt_hour } = *self;
+        let (beam, far) = (("beam_diameter_m", beam_diameter_m), ("distance_m", distance_m));
         check(
             "source",
             &[
                 ("divergence_deg", divergence_deg, 60.0),
-                ("beam_diameter_m", beam_diameter_m, 100.0),
-                ("distance_m", distance_m, 1e6),
                 ("bandwidth_nm", bandwidth_nm, 1e4),
                 ("drift_per_sqrt_hour", drift_per_sqrt_hour, 1.0),
             ],
         )
+        .or_else(|| check_or_none("source", &[(beam.0, beam.1, NARROWEST_M, 100.0)], "a spot that is never cut"))
+        .or_else(|| check_or_none("source", &[(far.0, far.1, NEAREST_M, 1e6)], "a collimated beam"))
     }
 }
 
@@ -183,9 +202,9 @@ impl Holder {
     #[must_use]
     pub fn fault(&self) -> Option<String> {
         let Self { diameter_m, height_u_m, tilt_u_deg } = *self;
-        let numbers =
-            [("diameter_m", diameter_m, 100.0), ("height_u_m", height_u_m, 1.0), ("tilt_u_deg", tilt_u_deg, 10.0)];
-        check("sample", &numbers)
+        let numbers = [("height_u_m", height_u_m, 1.0), ("tilt_u_deg", tilt_u_deg, 10.0)];
+        let size = [("diameter_m", diameter_m, NARROWEST_M, 100.0)];
+        check("sample", &numbers).or_else(|| check_or_none("sample", &size, "it catches every beam"))
     }
 }
 
@@ -201,22 +220,28 @@ impl Detector {
     pub fn fault(&self) -> Option<String> {
         let numbers = [
             ("aperture_deg", self.aperture_deg, 60.0),
-            ("distance_m", self.distance_m, 1e6),
-            ("field_diameter_m", self.field_diameter_m, 100.0),
             ("dark_per_s", self.dark_per_s, 1e15),
             ("dark_drift_per_sqrt_hour", self.dark_drift_per_sqrt_hour, 1e15),
-            ("full_well", self.full_well, 1e18),
             ("bits", f64::from(self.bits), 32.0),
-            ("nonlinearity_u", self.nonlinearity_u, 0.5),
+            // From a quarter on no signal is safe from saturation.
+            ("nonlinearity_u", self.nonlinearity_u, 0.2),
         ];
+        let (far, field) = (("distance_m", self.distance_m), ("field_diameter_m", self.field_diameter_m));
+        let well = [("full_well", self.full_well, 1.0, 1e18)];
         let rising = self.exposures_s.windows(2).all(|e| e[0] < e[1]);
         let possible = self.exposures_s.iter().all(|e| (LEAST..=1e6).contains(e));
         check("detector", &numbers)
+            .or_else(|| check_or_none("detector", &[(far.0, far.1, NEAREST_M, 1e6)], "far away"))
+            .or_else(|| check_or_none("detector", &[(field.0, field.1, NARROWEST_M, 100.0)], "it sees everything"))
+            .or_else(|| check_or_none("detector", &well, "never saturates"))
             .or_else(|| {
                 let good = rising && possible && !self.exposures_s.is_empty();
                 let found = &self.exposures_s;
-                (!good)
-                    .then(|| format!("instrument.detector.exposures_s: expected seconds, ascending, found {found:?}"))
+                (!good).then(|| {
+                    format!(
+                        "instrument.detector.exposures_s: expected one or more times from {LEAST:e} to 1e6 s, ascending, found {found:?}"
+                    )
+                })
             })
             .or_else(|| {
                 let needs = (self.bits > 0 || self.nonlinearity_u > 0.0) && self.full_well == 0.0;
@@ -231,8 +256,9 @@ impl Reference {
     pub fn fault(&self) -> Option<String> {
         let Self { reflectance, reflectance_u, theta_i_deg, theta_o_deg, shape } = *self;
         let numbers = [
-            ("reflectance", reflectance, 10.0),
-            ("reflectance_u", reflectance_u, 0.5),
+            // The factor of a white at 0/45 is a few per cent above 1.
+            ("reflectance", reflectance, 1.2),
+            ("reflectance_u", reflectance_u, 0.2),
             ("theta_i_deg", theta_i_deg, 80.0),
             ("theta_o_deg", theta_o_deg, 80.0),
             ("shape", shape, 1.0),

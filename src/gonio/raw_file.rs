@@ -15,7 +15,7 @@ use super::raw::Raw;
 use super::reading::{Kind, Reading};
 use crate::geometry::angles::direction_deg;
 use crate::measurement::formats::{flat_deg, is_reserved, push_number, spherical_deg};
-use crate::measurement::{Dimension, Directions, MeasurementError, Weights};
+use crate::measurement::{Dimension, Directions, MeasurementError, STOPPED, Weights};
 
 const ANGLES: [&str; 4] = ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"];
 const FLAT_ANGLES: [&str; 2] = ["theta_i_deg", "theta_o_deg"];
@@ -24,6 +24,7 @@ const SIGNAL: &str = "signal_";
 const WEIGHT: &str = "weight";
 const INSTRUMENT: &str = "# instrument:";
 const DIMENSION: &str = "# dimension:";
+const NOTE: &str = "# note:";
 const SOLID_ANGLE: &str = "# weights: solid-angle";
 /// Largest magnitudes of the four angles, with room for rounding.
 const LARGEST: [f64; 4] = [180.0001, 360.0001, 180.0001, 360.0001];
@@ -46,6 +47,9 @@ impl Raw {
         }
         if self.dimension == Dimension::Flat {
             let _ = writeln!(text, "{DIMENSION} 2");
+        }
+        for note in &self.notes {
+            let _ = writeln!(text, "{NOTE} {note}");
         }
         let names = angle_names(self.dimension).iter().chain(&PLACES).map(ToString::to_string);
         let signals = self.channels.iter().map(|c| format!("{SIGNAL}{c}"));
@@ -100,8 +104,15 @@ impl Raw {
             rows.take(&record)?;
         }
         let is_grid = text.lines().take_while(|l| l.starts_with('#')).any(|l| l.trim_end() == SOLID_ANGLE);
-        rows.list.finish(path, &columns, is_grid).map(|raw| (raw, instrument))
+        let raw = rows.list.finish(path, &columns, is_grid)?;
+        Ok((Self { notes: notes(text), ..raw }, instrument))
     }
+}
+
+/// What comments say of where the readings end.
+fn notes(text: &str) -> Vec<String> {
+    let comments = text.lines().take_while(|l| l.starts_with('#')).filter_map(|l| l.strip_prefix(NOTE));
+    comments.map(str::trim).filter(|note| note.starts_with(STOPPED)).map(str::to_owned).collect()
 }
 
 /// The world that a comment says, space by default.
@@ -109,16 +120,20 @@ fn dimension_of(path: &Path, text: &str) -> Result<Dimension, MeasurementError> 
     let comments = text.lines().enumerate().take_while(|(_, l)| l.starts_with('#'));
     let mut found = comments.filter_map(|(i, l)| l.strip_prefix(DIMENSION).map(|value| (i + 1, value.trim())));
     match found.next() {
-        None | Some((_, "3")) => Ok(Dimension::Space),
+        None => Ok(Dimension::Space),
         Some((_, "2")) => Ok(Dimension::Flat),
         Some((line, other)) => {
-            Err(MeasurementError::invalid(path, format!("line {line}, `{DIMENSION}`"), "2 or 3", format!("{other:?}")))
+            let expected = "2, the flat world; readings in space have no such line";
+            Err(MeasurementError::invalid(path, format!("line {line}, `{DIMENSION}`"), expected, format!("{other:?}")))
         }
     }
 }
 
-/// The instrument of the comment that describes it.
-fn described(path: &Path, text: &str) -> Result<Option<Instrument>, MeasurementError> {
+/// The instrument of the comment that describes it, `None` where a text has none.
+///
+/// # Errors
+/// [`MeasurementError`] naming the line and what is wrong with the description.
+pub fn described(path: &Path, text: &str) -> Result<Option<Instrument>, MeasurementError> {
     let comments = text.lines().enumerate().take_while(|(_, l)| l.starts_with('#'));
     let mut found = comments.filter_map(|(i, l)| l.strip_prefix(INSTRUMENT).map(|json| (i + 1, json.trim())));
     let Some((line, json)) = found.next() else { return Ok(None) };
@@ -230,6 +245,7 @@ impl List {
             readings: self.readings,
             signal: self.signal,
             quadrature_error: 0.0,
+            notes: Vec::new(),
         })
     }
 }

@@ -128,7 +128,7 @@ fn distinct(wi: &[DVec3], wo: &[DVec3]) -> (Vec<u32>, Vec<usize>) {
 }
 
 /// What the directions `kept` stand for.
-fn kept_weights(weights: Weights, kept: &[usize]) -> Weights {
+pub(super) fn kept_weights(weights: Weights, kept: &[usize]) -> Weights {
     let of = |list: Vec<f64>| kept.iter().map(|&i| list[i]).collect();
     match weights {
         Weights::SolidAngle(list) => Weights::SolidAngle(of(list)),

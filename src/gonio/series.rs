@@ -3,6 +3,7 @@
 use super::instrument::Instrument;
 use super::reading::{Kind, Reading};
 use super::travel::{Moves, Place};
+use crate::control::counted;
 use crate::measurement::Directions;
 
 /// The readings that measure these of the pairs of directions, in order of time. A pair that follows itself is one stop, read as often.
@@ -22,6 +23,39 @@ pub fn series(instrument: &Instrument, directions: &Directions, entries: &[u32])
     }
     list.visit();
     list.readings
+}
+
+/// Most raw readings of a simulation: with three channels they take some 5 GB, as much again as text.
+pub const MOST_READINGS: f64 = 5e7;
+
+/// How many readings [`series`] lists of so many pairs of directions, counted as often as they are read.
+#[must_use]
+pub fn readings(instrument: &Instrument, pairs: usize) -> f64 {
+    let exposures = instrument.detector.exposures_s.len() as f64;
+    let once = |present: bool, count: f64| if present { count } else { 0.0 };
+    let of_visit = once(instrument.has_reference(), exposures)
+        + once(instrument.surroundings.stray_per_sr > 0.0, 1.0)
+        + once(instrument.has_dark(), 1.0);
+    let visits = pairs.div_ceil(instrument.protocol.block.max(1) as usize) as f64 + 1.0;
+    pairs as f64 * exposures * f64::from(instrument.readings)
+        + visits * of_visit * f64::from(instrument.protocol.repeats)
+}
+
+/// Says that so many pairs of directions ask for more than [`MOST_READINGS`], where they do.
+#[must_use]
+pub fn too_many(instrument: &Instrument, pairs: usize) -> Option<String> {
+    let asked = readings(instrument, pairs);
+    let (block, repeats) = (instrument.protocol.block, instrument.protocol.repeats);
+    let exposures = instrument.detector.exposures_s.len();
+    (asked > MOST_READINGS).then(|| {
+        format!(
+            "instrument.readings = {}, instrument.protocol.block = {block}, instrument.protocol.repeats = {repeats} and {} ask for \
+             {asked:.3e} raw readings at {}: expected at most {MOST_READINGS:e}",
+            instrument.readings,
+            counted(exposures as u64, "exposure"),
+            counted(pairs as u64, "pair") + " of directions"
+        )
+    })
 }
 
 struct Series<'a> {
@@ -95,7 +129,10 @@ mod tests {
         assert!(list.windows(2).all(|r| r[0].time_s < r[1].time_s));
         let entries: Vec<u32> = list.iter().filter_map(|r| r.entry).collect();
         assert!(entries.is_sorted() && entries.last() == Some(&9));
-        assert!(series(&Instrument::noiseless(), &directions, &pairs).iter().all(|r| r.kind == Kind::Sample));
+        assert_eq!(readings(&instrument, pairs.len()), list.len() as f64);
+        let all = series(&Instrument::noiseless(), &directions, &pairs);
+        assert!(all.iter().all(|r| r.kind == Kind::Sample));
+        assert_eq!(readings(&Instrument::noiseless(), pairs.len()), all.len() as f64);
         // Of three in a row one lies in the next block, behind a visit and another move.
         let stops = |rows: &[u32]| {
             let list = series(&instrument, &directions, rows);

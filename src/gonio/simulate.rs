@@ -1,12 +1,15 @@
 //! The forward simulation: truth, instrument and scan to a measurement.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::forward::lit_rows;
 use super::instrument::Instrument;
 use super::scan::Scan;
-use crate::control::Control;
-use crate::measurement::{Masked, Measurement};
+use crate::control::{Control, counted};
+use crate::measurement::{Masked, Measurement, STOPPED};
 use crate::numeric::sum::BLOCK;
 
 /// The material on the sample holder: writes the value of every channel for (wi, wo) above the horizon, in 1/sr (1/rad in the
@@ -28,6 +31,7 @@ pub fn simulate(
     let (directions, weights) = scan.directions()?;
     let (n, width) = (directions.len(), channels.len());
     let times = times(scan, n);
+    let measured = AtomicU64::new(0);
     control.progress.start("measuring", n as u64);
     let blocks: Vec<Block> = (0..n.div_ceil(BLOCK))
         .into_par_iter()
@@ -35,12 +39,13 @@ pub fn simulate(
             let range = b * BLOCK..((b + 1) * BLOCK).min(n);
             let len = range.len();
             let (mut values, mut sigma) = (vec![f64::NAN; len * width], vec![f64::NAN; len * width]);
-            let mut f = vec![0.0; width];
-            if control.stop.requested() {
-                return (values, sigma); // not measured
-            }
+            let (mut f, mut seen) = (vec![0.0; width], 0);
             for (slot, i) in range.enumerate() {
+                if control.stop.requested() {
+                    break; // the rest is not measured
+                }
                 let (wi, wo) = directions.pair(i);
+                seen += u64::from(wi.z > 0.0 && wo.z > 0.0);
                 if wi.z > 0.0 && wo.z > 0.0 && truth(wi, wo, &mut f) {
                     let repeated = times.get(i).map(|&times| repeated(instrument, times));
                     let instrument = repeated.as_ref().unwrap_or(instrument);
@@ -50,6 +55,7 @@ pub fn simulate(
                     }
                 }
             }
+            measured.fetch_add(seen, Ordering::Relaxed);
             control.progress.advance(len as u64);
             (values, sigma)
         })
@@ -58,8 +64,11 @@ pub fn simulate(
     let values = join_planes(width, &blocks, |b| &b.0);
     let marked = values.iter().filter(|v| v.is_nan()).count() as u64;
     let sigma = instrument.is_noisy().then(|| join_planes(width, &blocks, |b| &b.1));
-    let stopped = control.stop.requested();
-    let notes = stopped.then(|| "stopped before the scan's end: the rest was not measured".to_owned());
+    let lit = lit_rows(&directions, &[]).len() as u64;
+    let missed = lit - measured.into_inner().min(lit);
+    let notes = (missed > 0).then(|| {
+        format!("{STOPPED}{} of {lit} readings: {} of directions not read", lit - missed, counted(missed, "pair"))
+    });
     Some(Measurement {
         notes: notes.into_iter().collect(),
         origin: format!("simulated, scan {scan}, seed {seed}"),

@@ -15,11 +15,11 @@ pub struct Spared {
 
 impl Job<'_> {
     /// Effects that may be left out of this job's readings for a relative `tolerance`: what they change in any reading of the sample, noise counted
-    /// by its σ, adds up to less, singly measured and measured all at once.
+    /// by its σ, adds up to less, singly measured and measured all at once. None once the work is stopped.
     #[must_use]
     pub fn spared(&self, tolerance: f64, control: Control<'_>) -> Vec<Spared> {
         let (readings, actual) = self.prepare();
-        let study = Study::new(self, &readings, &actual);
+        let study = Study::new(self, &readings, &actual, control.stop);
         let contributions = study.contributions(control).effects;
         let mut list: Vec<(Spared, bool)> = contributions.iter().filter_map(bounded).collect();
         list.sort_by(|a, b| a.0.bound.total_cmp(&b.0.bound));
@@ -31,6 +31,9 @@ impl Job<'_> {
         let mut few: Vec<(Spared, bool)> = few.copied().collect();
         while !few.is_empty() && together(&study, &few) >= tolerance {
             few.pop();
+        }
+        if control.stop.requested() {
+            return Vec::new();
         }
         few.into_iter().map(|(spared, _)| spared).collect()
     }

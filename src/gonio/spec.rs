@@ -43,6 +43,14 @@ impl SimulationSpec {
     /// # Errors
     /// [`SpecError`] naming the place or the field.
     pub fn from_toml(text: &str) -> Result<Self, SpecError> {
+        if let Ok(table) = text.parse::<toml::Table>()
+            && !table.contains_key("version")
+        {
+            let found = if table.is_empty() { "a file without any key" } else { "none" };
+            return Err(SpecError::Value(format!(
+                "version: expected the line `version = 1` at the beginning, found {found}"
+            )));
+        }
         let spec: Self = toml::from_str(text).map_err(|e| SpecError::Toml(e.to_string()))?;
         if spec.version != 1 {
             return Err(SpecError::Value(format!("version: expected 1, found {}", spec.version)));
@@ -71,6 +79,8 @@ mod tests {
             ("version = 1\ncolour = 3", "colour"),
             ("version = 1\n[instrument]\nread_noise = -2", "read_noise"),
             ("version = ", "line 1"),
+            ("", "expected the line `version = 1` at the beginning, found a file without any key"),
+            ("seed = 3", "expected the line `version = 1` at the beginning, found none"),
         ] {
             let error = SimulationSpec::from_toml(text).expect_err(text).to_string();
             assert!(error.contains(says), "{text}: {error}");

@@ -11,6 +11,9 @@ pub mod merl_grid;
 pub mod summary;
 pub mod table;
 
+/// How the note begins that says that a measurement ends before its scan does; unlike other notes it is kept in CSV files (`# note:`).
+pub const STOPPED: &str = "stopped after ";
+
 pub use error::MeasurementError;
 pub use formats::{Format, Quantity, ReadOptions};
 pub use interpolate::{Albedo, TableBrdf, directional_albedo};

@@ -86,3 +86,63 @@ fn an_interrupted_demo_writes_what_it_has_and_says_so() {
     assert_eq!(numbers["stopped"], true);
     assert!(numbers["fits"][1]["image"].is_null(), "a picture that was not rendered has no numbers: {numbers}");
 }
+
+#[test]
+fn an_interrupted_simulation_writes_what_it_read_and_says_so() {
+    let b = Bench::new();
+    for raw in [&[][..], &["--raw", "raw.csv"]] {
+        let scan = ["--scan", "hemisphere:2", "--out", "x.csv"];
+        let args = [&["simulate", "--instrument", "commercial", "--material", "satin"], &scan[..], raw].concat();
+        let (code, _, err) = interrupted(&b, &args, Duration::from_secs(3));
+        assert_eq!(code, Some(130), "{err}");
+        assert!(err.contains("stopped after "), "{err}");
+        if err.contains("nothing is written") {
+            assert!(!b.path("x.csv").exists(), "{err}");
+            continue; // a slow machine
+        }
+        let note =
+            err.lines().find_map(|l| l.strip_prefix("warning: ").filter(|l| l.starts_with("stopped"))).expect("it");
+        let text = b.text("x.csv");
+        assert!(text.lines().any(|l| l == format!("# note: {note}")), "{note}");
+        // Pairs that were not read are not there, and not said to have been saturated.
+        assert!(!err.contains("nothing was read"), "{err}");
+        let rows = text.lines().filter(|l| !l.starts_with(['#', 't'])).count();
+        assert!(rows > 0 && rows < 46 * (1 + 44 * 180), "{rows}");
+        let info = b.ok(&["info", "x.csv"]).text();
+        assert!(info.contains(note), "{info}");
+    }
+    if b.path("raw.csv").exists() && b.path("x.csv").exists() {
+        let again = b.ok(&["reduce", "raw.csv", "--out", "y.csv"]);
+        assert!(
+            again.err.contains("stopped after ") && b.text("y.csv").contains("# note: stopped after "),
+            "{}",
+            again.err
+        );
+    }
+}
+
+#[test]
+fn an_interrupted_simulation_of_a_plain_detector_says_how_far_it_came() {
+    let b = Bench::new();
+    let args = ["simulate", "--material", "satin", "--scan", "hemisphere:1.5", "--out", "x.csv"];
+    let (code, _, err) = interrupted(&b, &args, Duration::from_millis(60));
+    // It may have been done, or not begun, in that time.
+    assert_eq!(code, Some(130), "{err}");
+    if b.path("x.csv").exists() && err.contains("stopped after ") {
+        let head: String = b.text("x.csv").lines().take(4).collect();
+        assert!(head.contains("# note: stopped after "), "{head}");
+    }
+}
+
+#[test]
+fn a_simulation_that_is_interrupted_before_its_first_reading_writes_nothing() {
+    let b = Bench::new();
+    let args = ["simulate", "--instrument", "commercial", "--material", "mirror-like", "--scan", "adaptive:1000"];
+    let (code, out, err) = interrupted(&b, &[&args[..], &["--out", "x.csv"]].concat(), Duration::from_millis(500));
+    assert_eq!(code, Some(130), "{err}");
+    assert!(!err.contains("panicked"), "{err}");
+    // While directions are chosen nothing counts yet; a fast machine may have been past that.
+    if !b.path("x.csv").exists() && !err.is_empty() {
+        assert!(out.is_empty() && err.contains("stopped"), "{err}");
+    }
+}

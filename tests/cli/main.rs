@@ -3,6 +3,7 @@
 
 mod adaptive;
 mod bench;
+mod careful;
 mod chain;
 mod compare;
 mod effects;

@@ -79,6 +79,9 @@ fn readings_hold_the_truth_and_come_back_from_their_file() {
     let share = f64::from(held) / f64::from(all);
     println!("{share}");
     assert!((share - 0.95).abs() < 0.05, "{share}");
-    let wrong = Raw::from_csv(std::path::Path::new("r.csv"), &text.replace("# dimension: 2", "# dimension: 4"));
-    assert!(wrong.expect_err("no world").to_string().contains("2 or 3"));
+    for other in ["3", "4"] {
+        let wrong = text.replace("# dimension: 2", &format!("# dimension: {other}"));
+        let said = Raw::from_csv(std::path::Path::new("r.csv"), &wrong).expect_err("no such line").to_string();
+        assert!(said.contains("expected 2, the flat world") && said.contains(&format!("found \"{other}\"")), "{said}");
+    }
 }

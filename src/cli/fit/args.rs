@@ -128,6 +128,12 @@ pub(in crate::cli) fn parse_time(text: &str) -> Result<Duration, String> {
 }
 
 /// `1%` or `0.01`.
+/// A relative tolerance below 1: `1%` or `0.01`.
+pub(in crate::cli) fn parse_tolerance(text: &str) -> Result<f64, String> {
+    let below_one = parse_share(text).ok().filter(|share| *share < 1.0);
+    below_one.ok_or_else(|| "expected a relative tolerance above 0 and below 1, 1% or 0.01 say".into())
+}
+
 pub(in crate::cli) fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
     let share: Option<f64> = number.trim().parse().ok().filter(|share: &f64| *share > 0.0 && share.is_finite());

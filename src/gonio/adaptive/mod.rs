@@ -104,13 +104,16 @@ fn worst(mut gaps: Vec<Gap>, count: usize) -> Vec<Gap> {
 
 impl Job<'_> {
     /// What is known when the last pair of directions has just been read: reduced without the visit that would close the scan. `None` where nothing
-    /// can be reduced.
+    /// can be reduced, and where the work is stopped.
     #[must_use]
     pub fn look(&self, control: Control<'_>) -> Option<Look> {
         let (mut readings, actual) = self.prepare();
         let samples = readings.iter().rposition(|r| r.kind == Kind::Sample).map_or(0, |last| last + 1);
         readings.truncate(samples);
         let raw = self.read(readings, &actual, control);
+        if !raw.notes.is_empty() {
+            return None; // stopped
+        }
         let table = reduce("look", &raw, self.instrument, None).ok()?.measurement;
         let (mut time_s, mut saturated) = (vec![0.0; table.len()], vec![false; table.len()]);
         let limit = saturation_limit(self.instrument);

@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use super::cone::Cones;
 use super::{Block, Maker, Pass};
+use crate::control::Stop;
 use crate::gonio::parts::Reference;
 use crate::gonio::reading::Kind;
 use crate::gonio::simulate::Truth;
@@ -28,7 +29,7 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     if source == 0.0 && detector == 0.0 {
         return Box::new(light);
     }
-    Box::new(Spread { light, cones: Cones::new(source, detector, maker.accuracy, maker.dimension) })
+    Box::new(Spread { light, cones: Cones::new(source, detector, maker.accuracy, maker.dimension), stop: maker.stop })
 }
 
 /// The BRDF of the reference standard.
@@ -98,6 +99,7 @@ impl Pass for Light<'_> {
 struct Spread<'a> {
     light: Light<'a>,
     cones: Cones,
+    stop: &'a Stop,
 }
 
 impl Pass for Spread<'_> {
@@ -105,6 +107,10 @@ impl Pass for Spread<'_> {
         let (mut f, mut out) = (vec![0.0; block.width], vec![0.0; block.width]);
         let mut last = None;
         for (i, reading) in block.readings.iter().enumerate() {
+            if self.stop.requested() {
+                block.done = i;
+                return;
+            }
             let (gain, light) = (self.light.gain, &self.light);
             let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
                 light.add(reading.kind, (wi, wo), gain * weight, &mut f, out);

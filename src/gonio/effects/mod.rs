@@ -29,7 +29,7 @@ use super::actual::Actual;
 use super::instrument::Instrument;
 use super::reading::Reading;
 use super::simulate::Truth;
-use crate::control::Plan;
+use crate::control::{Plan, Stop};
 use crate::measurement::Dimension;
 
 /// Some readings in a row, on their way from directions to electrons.
@@ -48,6 +48,8 @@ pub(super) struct Block<'a> {
     pub signal: Vec<f64>,
     /// Largest share by which a quadrature may be off.
     pub error: f64,
+    /// How many of the readings are done; fewer than there are where a pass was stopped.
+    pub done: usize,
 }
 
 impl Block<'_> {
@@ -82,6 +84,8 @@ pub(super) struct Maker<'a> {
     pub seed: u64,
     /// Relative error that quadratures may have.
     pub accuracy: f64,
+    /// Looked at between readings where one takes long.
+    pub stop: &'a Stop,
 }
 
 /// The effect of a file: its name, and whether and why an instrument calls for it in these channels.

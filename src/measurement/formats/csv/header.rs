@@ -6,7 +6,7 @@ use super::Needs;
 use super::{ANGLES, FLAT_ANGLES, GRIDS, SOLID_ANGLE, is_reserved};
 use crate::measurement::formats::Quantity;
 use crate::measurement::formats::text::{Line, Lines, quoted};
-use crate::measurement::{Dimension, MeasurementError, MerlAngles};
+use crate::measurement::{Dimension, MeasurementError, MerlAngles, STOPPED};
 
 /// What the comments say.
 #[derive(Debug, Default)]
@@ -73,6 +73,7 @@ impl Comments {
                 }
             }
             "weights" => self.solid_angle = value == SOLID_ANGLE,
+            "note" if value.starts_with(STOPPED) => self.notes.push(value.into()),
             _ => {}
         }
         Ok(())

@@ -8,13 +8,13 @@ use glam::DVec3;
 
 use super::{ANGLES, FLAT_ANGLES, GRIDS, SOLID_ANGLE, is_reserved};
 use crate::geometry::angles::{direction_deg, phi_of, sin_cos_deg, theta_of};
-use crate::measurement::{Dimension, Directions, Measurement, MeasurementError, Weights};
+use crate::measurement::{Dimension, Directions, Measurement, MeasurementError, STOPPED, Weights};
 use crate::numeric::sum::map_blocks;
 
 /// Rows formatted at once, in parallel blocks, before they are written.
 const ROWS_AT_ONCE: usize = 1 << 16;
 
-/// Writes `measurement`: everything but its name, origin and notes comes back on reading.
+/// Writes `measurement`: everything but its name, origin and notes comes back on reading; of notes the one that it was stopped does.
 pub(in crate::measurement::formats) fn write(
     measurement: &Measurement,
     path: &Path,
@@ -61,6 +61,9 @@ fn write_comments(measurement: &Measurement, out: &mut dyn Write) -> std::io::Re
     }
     if matches!(measurement.weights, Weights::SolidAngle(_)) {
         writeln!(out, "# weights: {SOLID_ANGLE}")?;
+    }
+    for note in measurement.notes.iter().filter(|note| note.starts_with(STOPPED)) {
+        writeln!(out, "# note: {note}")?;
     }
     Ok(())
 }
