@@ -230,6 +230,7 @@ mod tests {
             readings: vec![],
             signal: vec![],
             quadrature_error: 0.0,
+            notes: vec![],
         }
     }
 
