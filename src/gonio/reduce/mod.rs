@@ -267,7 +267,11 @@ impl Left {
     fn notes(&self, width: usize) -> Vec<String> {
         let pairs = |count: u64, why: &str| {
             let count = count.div_ceil(width.max(1) as u64);
-            (count > 0).then(|| format!("{count} pairs of directions are masked: {why}"))
+            match count {
+                0 => None,
+                1 => Some(format!("1 pair of directions is masked: {why}")),
+                _ => Some(format!("{count} pairs of directions are masked: {why}")),
+            }
         };
         let list = [
             pairs(self.saturated, "even the shortest exposure saturated, or nothing was read"),
