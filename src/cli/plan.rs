@@ -151,25 +151,25 @@ impl Table {
         // Writing to a String can't fail.
         let _ = writeln!(text, "{:14}{:>9}{:>9}{:>12}{}", "scan", "stops", "hours", "efficiency", heads.join(""));
         for (name, of, efficiency) in &self.scans {
-            let _ = writeln!(text, "{}", Self::line(name, of, 1.0, *efficiency));
+            let _ = writeln!(text, "{}", Self::line(name, of, *efficiency));
         }
         let _ = writeln!(text, "as many hours as the plan:");
         for (name, of, efficiency) in &self.scans[1..] {
-            let _ = writeln!(text, "{}", Self::line(name, of, (of.hours / self.scans[0].1.hours).sqrt(), *efficiency));
+            let _ = writeln!(text, "{}", Self::line(name, &of.in_hours(self.scans[0].1.hours), *efficiency));
         }
         text.push_str(
-            "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' own noise. \
-             Efficiency: the share of the best information an hour.",
+            "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' noise and what \
+             they share: positions and the certificate. Efficiency: the share of the best information an hour by noise alone.",
         );
         text
     }
 
-    /// One scan; its errors times `scale`.
-    fn line(name: &str, of: &Precision, scale: f64, efficiency: f64) -> String {
-        let percent = |e: f64| if e.is_finite() { significant(100.0 * scale * e) } else { "open".into() };
+    /// One scan.
+    fn line(name: &str, of: &Precision, efficiency: f64) -> String {
+        let percent = |e: f64| if e.is_finite() { significant(100.0 * e) } else { "open".into() };
         let cell = |e: &[f64; 3]| format!("{:>24}", format!("{} ({})", percent(e[1]), percent(e[2])));
         let cells: Vec<String> = of.errors.iter().map(cell).collect();
-        let hours = significant(of.hours / scale.powi(2)); // errors fall as 1/√hours
+        let hours = significant(of.hours);
         let share = format!("{} %", significant(100.0 * efficiency));
         format!("{name:14}{:>9}{hours:>9}{share:>12}{}", of.stops, cells.join(""))
     }

@@ -3,7 +3,7 @@
 use crate::planned::{hours_of, planned, prior, rms, scan_of, truth};
 use crate::support::lab;
 use goniofit::gonio::design::{Prior, Range, precision};
-use goniofit::gonio::parts::{Axes, Detector};
+use goniofit::gonio::parts::{Axes, Detector, Holder, Reference};
 use goniofit::gonio::{Instrument, Scan};
 
 /// Axes that take 5 s to move.
@@ -72,4 +72,42 @@ fn a_plan_knows_jitter_and_saturation() {
     let plan = planned(&small, 0.5);
     let (brightest, _) = rms(&scan_of(&plan), &small, 20);
     assert!(brightest.iter().all(|e| *e < 0.2), "{brightest:?}");
+}
+
+/// Zeros, tilt and a certificate that readings share: the plan's stated errors are those of redrawn instruments, and it is no worse than the usual scan
+/// in the same hours.
+#[test]
+fn a_plan_knows_what_readings_share() {
+    let base = moving();
+    let instrument = Instrument {
+        axes: Axes { zero_u_deg: 0.05, ..base.axes },
+        sample: Holder { tilt_u_deg: 0.05, ..base.sample },
+        reference: Reference { reflectance: 0.99, reflectance_u: 0.002, ..base.reference },
+        ..base
+    };
+    let grid = Scan::InPlane { step_deg: 5.0 };
+    let hours = hours_of(&grid, &instrument);
+    let plan = planned(&instrument, hours);
+    let ((by_grid, _), (by_plan, open)) = (rms(&grid, &instrument, TRUTHS), rms(&scan_of(&plan), &instrument, TRUTHS));
+    println!("{grid}: {by_grid:?}, plan: {by_plan:?}, stated {:?}", plan.precision.errors);
+    assert_eq!(open, 0);
+    for (k, (g, p)) in by_grid.iter().zip(by_plan).enumerate() {
+        assert!(p <= g * (1.0 + chance()), "{}: {p} {g}", prior().names()[k]);
+    }
+    // At one truth, over redrawn instruments.
+    let [kd, ks, n] = truth(3);
+    let mut at = prior();
+    for (name, x) in [("lambert.weight", kd), ("phong.weight", ks), ("phong.exponent", n)] {
+        at = Prior::with(at, Range { name: name.into(), low: x, high: x }).expect("a range");
+    }
+    let stated = precision(&at, &instrument, &plan.directions, &plan.rows);
+    let draws = 200u64;
+    let errors: Vec<[f64; 3]> =
+        (0..draws).filter_map(|seed| crate::planned::off(&scan_of(&plan), &instrument, [kd, ks, n], seed)).collect();
+    for k in 0..3 {
+        let square = errors.iter().map(|e| (e[k] / stated.errors[k][1]).powi(2)).sum::<f64>() / errors.len() as f64;
+        println!("{}: mean square {square}", at.names()[k]);
+        // The noise of the reference's visits is not counted; squares of few shared errors scatter by √(2/200), 5 σ of which and a quarter.
+        assert!((0.4..1.75).contains(&square), "{k}: {square}");
+    }
 }

@@ -2,8 +2,9 @@
 //!
 //! In: a model, a prior of its parameters, an instrument, a budget. Out: pairs of directions, each read as often as it is worth, and how precise they
 //! and other scans make the parameters. The one decision to know: what counts is information per second of the instrument, averaged
-//! over the prior (Bayesian D-optimality: Chaloner & Larntz 1989; Fedorov & Leonov 2013, ch. 5 on cost), of one channel, by readings' own noise. Errors
-//! that readings share do not count: a certificate's is the same wherever one measures, those of axes and tilt are not, and are left out all the same.
+//! over the prior (Bayesian D-optimality: Chaloner & Larntz 1989; Fedorov & Leonov 2013, ch. 5 on cost), of one channel, by readings' own noise. What
+//! readings share, positions and the certificate, decides between that scan, the same with each pair's partner across the mirror direction, and an even
+//! one, and is in the errors that are stated.
 
 mod candidates;
 mod information;

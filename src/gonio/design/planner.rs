@@ -3,12 +3,14 @@
 use super::candidates::{self, Pair};
 use super::information::{Model, Noise};
 use super::optimum::{Optimum, Table, best};
-use super::precision::{Precision, precision};
+use super::precision::{Precision, counts, precision};
 use super::prior::{Prior, Wrong};
 use super::rounding::{self, Share};
-use crate::geometry::angles::{phi_of, theta_of};
+use crate::geometry::angles::{angle_between, phi_of, theta_of};
+use crate::geometry::mirror;
 use crate::gonio::cost::{dwell_s, visit_s};
 use crate::gonio::instrument::Instrument;
+use crate::gonio::scan::Scan;
 use crate::gonio::travel::move_s;
 use crate::measurement::Directions;
 
@@ -48,13 +50,15 @@ const FIRST: f64 = 0.5;
 /// Most distinct pairs, and the share of the largest weight that each must have.
 const MOST_PAIRS: usize = 60;
 const LEAST_SHARE: f64 = 0.01;
+/// Step of the usual scan that is tried beside, degrees.
+const EVEN_DEG: f64 = 5.0;
 
 /// Proposes where to measure.
 ///
 /// # Errors
 /// [`Wrong`]: a detector without noise, a prior that no scan tells, a budget that is too small or too large.
 pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
-    let Wish { prior, instrument, budget_s } = *wish;
+    let Wish { prior, instrument, .. } = *wish;
     if !instrument.is_noisy() {
         return Err(Wrong::Noiseless);
     }
@@ -67,14 +71,15 @@ pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
     let optimum = if table.draws.is_empty() { None } else { best(&table) }.ok_or_else(open)?;
     let (kept, weights) = supported(&table, &optimum, affordable(wish, usual_s));
     let share = |(&x, weight): (&usize, &f64)| Share { weight: *weight, ..stops[x] };
-    let mut chosen: Vec<(Pair, Share)> = kept.iter().zip(&weights).map(|of| (pairs[*of.0], share(of))).collect();
-    chosen.sort_by(|a, b| place(a.0).partial_cmp(&place(b.0)).unwrap_or(std::cmp::Ordering::Equal));
-    let shares: Vec<Share> = chosen.iter().map(|c| c.1).collect();
-    let (wi, wo) = chosen.iter().map(|c| c.0).unzip();
-    let directions = Directions::List { wi, wo };
-    let rows = rounding::rows(&shares, &directions, instrument, budget_s)?;
+    let chosen: Vec<(Pair, Share)> = kept.iter().zip(&weights).map(|of| (pairs[*of.0], share(of))).collect();
+    let even = even_grid(wish, usual_s, &draws);
+    // By noise alone the first is best; by what readings share another may be.
+    let others = [mirrored(&chosen, instrument), even].into_iter().filter_map(|list| whole(list, wish).ok());
+    let first = whole(chosen, wish)?;
+    let Scanned { directions, rows, precision } =
+        others.fold(first, |best, other| if other.sureness() > best.sureness() { other } else { best });
     Ok(Plan {
-        precision: precision(prior, instrument, &directions, &rows),
+        precision,
         directions,
         rows,
         best_a_second: optimum.mean_ln_det,
@@ -82,6 +87,57 @@ pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
         undetermined,
         draws: draws.len(),
     })
+}
+
+/// Whole readings.
+struct Scanned {
+    directions: Directions,
+    rows: Vec<u32>,
+    precision: Precision,
+}
+
+impl Scanned {
+    fn sureness(&self) -> f64 {
+        self.precision.mean_ln_sure
+    }
+}
+
+/// Shares of the time to whole readings, in the order of reading.
+fn whole(mut list: Vec<(Pair, Share)>, wish: &Wish<'_>) -> Result<Scanned, Wrong> {
+    let Wish { prior, instrument, budget_s } = *wish;
+    list.sort_by(|a, b| place(a.0).partial_cmp(&place(b.0)).unwrap_or(std::cmp::Ordering::Equal));
+    let shares: Vec<Share> = list.iter().map(|c| c.1).collect();
+    let (wi, wo) = list.iter().map(|c| c.0).unzip();
+    let directions = Directions::List { wi, wo };
+    let rows = rounding::rows(&shares, &directions, instrument, budget_s)?;
+    Ok(Scanned { precision: precision(prior, instrument, &directions, &rows), directions, rows })
+}
+
+/// Each pair together with that on the other side of the mirror direction, where there is one: what moves a lobe raises the one and lowers the other.
+fn mirrored(list: &[(Pair, Share)], instrument: &Instrument) -> Vec<(Pair, Share)> {
+    let half = |share: Share| Share { weight: 0.5 * share.weight, ..share };
+    let mut all = Vec::with_capacity(2 * list.len());
+    for ((wi, wo), share) in list {
+        let top = mirror(*wi);
+        let other = (2.0 * top.dot(*wo) * top - *wo).normalize();
+        let same = angle_between(other, *wo) < 1e-6;
+        if same || !counts((*wi, other), instrument) {
+            all.push(((*wi, *wo), *share));
+            continue;
+        }
+        all.extend([*wo, other].map(|wo| ((*wi, wo), half(*share))));
+    }
+    all
+}
+
+/// The usual scan in the plane of incidence, every pair as often: what shows errors of positions, for it has both sides of every lobe.
+fn even_grid(wish: &Wish<'_>, move_s: f64, draws: &[Vec<f64>]) -> Vec<(Pair, Share)> {
+    let Some((directions, _)) = (Scan::InPlane { step_deg: EVEN_DEG }).directions() else { return Vec::new() };
+    let pairs: Vec<Pair> = (0..directions.len()).map(|i| directions.pair(i)).collect();
+    let pairs: Vec<Pair> = pairs.into_iter().filter(|pair| counts(*pair, wish.instrument)).collect();
+    let (stops, _) = tell(wish.prior, wish.instrument, move_s, &pairs, draws);
+    let weight = 1.0 / pairs.len().max(1) as f64;
+    pairs.into_iter().zip(stops).map(|(pair, stop)| (pair, Share { weight, ..stop })).collect()
 }
 
 impl Plan {

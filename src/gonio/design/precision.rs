@@ -1,5 +1,7 @@
 //! How well a scan tells the parameters of a model, over a prior of them.
 
+use std::collections::BTreeMap;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -12,6 +14,7 @@ use crate::geometry::angles::theta_of;
 use crate::gonio::cost::hours;
 use crate::gonio::effects::shadow::may_be_shadowed;
 use crate::gonio::instrument::Instrument;
+use crate::gonio::reduce::positions::Kept;
 use crate::measurement::Directions;
 
 /// What a scan costs and tells.
@@ -23,11 +26,24 @@ pub struct Precision {
     pub stops: usize,
     /// Readings, repeats of the instrument's own not counted.
     pub rows: usize,
-    /// Relative standard errors by readings' own noise, parameter by parameter, at the 10 %, 50 % and 90 % quantiles of the prior; infinite where the
-    /// scan does not tell the parameter.
+    /// Relative standard errors, parameter by parameter, at the 10 %, 50 % and 90 % quantiles of the prior: by readings' own noise and by what they
+    /// share, errors of positions and the certificate. Infinite where the scan does not tell the parameter.
     pub errors: Vec<[f64; 3]>,
-    /// Mean over the prior of ln det of the information on ln(parameter); −∞ where the scan leaves a parameter open anywhere in the prior.
+    /// Mean over the prior of ln det of the information of the noise on ln(parameter); −∞ where the scan leaves a parameter open anywhere in the prior.
     pub mean_ln_det: f64,
+    /// The same with what readings share: minus the mean of ln det of the covariance.
+    pub(super) mean_ln_sure: f64,
+    /// At each draw of the prior.
+    told: Vec<Told>,
+}
+
+/// What a scan tells at one draw of the prior.
+#[derive(Debug, Clone, PartialEq)]
+struct Told {
+    /// Information of the noise, parameters by parameters.
+    own: DMatrix<f64>,
+    /// The same times what each shared error moves: parameters by errors.
+    shared: DMatrix<f64>,
 }
 
 /// Quantiles of the prior that errors are given at.
@@ -36,31 +52,53 @@ pub const QUANTILES: [f64; 3] = [0.1, 0.5, 0.9];
 /// The precision of a scan whose rows are read in this order, over the prior's draws.
 #[must_use]
 pub fn precision(prior: &Prior, instrument: &Instrument, directions: &Directions, rows: &[u32]) -> Precision {
-    let of = |row: u32| directions.pair(row as usize);
     let stops = stops(instrument, rows);
-    let told: Vec<(Pair, usize)> =
-        stops.iter().map(|(row, n)| (of(*row), *n)).filter(|(p, _)| counts(*p, instrument)).collect();
-    let (model, noise) = (Model::of(prior), Noise::of(instrument));
+    let mut lengths: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    stops.iter().for_each(|(row, n)| lengths.entry(*row).or_default().push(*n));
+    let of_pair = |(row, list): (u32, Vec<usize>)| (directions.pair(row as usize), list);
+    let told: Vec<(Pair, Vec<usize>)> =
+        lengths.into_iter().map(of_pair).filter(|(pair, _)| counts(*pair, instrument)).collect();
+    let (model, noise, kept) = (Model::of(prior), Noise::of(instrument), Kept::of(instrument));
     let draws = prior.draws();
-    let each: Vec<DMatrix<f64>> = draws.par_iter().map(|draw| at(&model, &noise, draw, &told)).collect();
-    let errors: Vec<Vec<f64>> = each.iter().map(relative_errors).collect();
-    let quantiles = |a: usize| {
-        let mut list: Vec<f64> = errors.iter().map(|e| e[a]).collect();
-        list.sort_by(f64::total_cmp);
-        QUANTILES.map(|q| list[(q * (list.len() - 1) as f64).round() as usize])
-    };
-    let ln_det = |m: &DMatrix<f64>| {
-        m.clone()
-            .cholesky()
-            .map_or(f64::NEG_INFINITY, |c| 2.0 * c.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>())
-    };
-    Precision {
-        hours: hours(instrument, directions, rows),
-        stops: stops.len(),
-        rows: rows.len(),
-        errors: (0..model.parameters()).map(quantiles).collect(),
-        mean_ln_det: each.iter().map(ln_det).sum::<f64>() / each.len() as f64,
+    let each: Vec<Told> = draws.par_iter().map(|draw| at(&model, (&noise, &kept), draw, &told)).collect();
+    let hours = hours(instrument, directions, rows);
+    Precision::new(hours, (stops.len(), rows.len()), each)
+}
+
+impl Precision {
+    fn new(hours: f64, (stops, rows): (usize, usize), told: Vec<Told>) -> Self {
+        let errors: Vec<Vec<f64>> = told.iter().map(Told::relative_errors).collect();
+        let quantiles = |a: usize| {
+            let mut list: Vec<f64> = errors.iter().map(|e| e[a]).collect();
+            list.sort_by(f64::total_cmp);
+            QUANTILES.map(|q| list[(q * (list.len() - 1) as f64).round() as usize])
+        };
+        let parameters = errors.first().map_or(0, Vec::len);
+        let mean = |of: &dyn Fn(&Told) -> f64| told.iter().map(of).sum::<f64>() / told.len() as f64;
+        Self {
+            hours,
+            stops,
+            rows,
+            errors: (0..parameters).map(quantiles).collect(),
+            mean_ln_det: mean(&|t| ln_det(&t.own)),
+            mean_ln_sure: mean(&Told::ln_sure),
+            told,
+        }
     }
+
+    /// That of the same scan read so often that it takes `hours`: what readings share stays.
+    #[must_use]
+    pub fn in_hours(&self, hours: f64) -> Self {
+        let times = hours / self.hours;
+        let of = |told: &Told| Told { own: &told.own * times, shared: &told.shared * times };
+        Self::new(hours, (self.stops, self.rows), self.told.iter().map(of).collect())
+    }
+}
+
+/// ln det of a positive matrix, else −∞.
+fn ln_det(m: &DMatrix<f64>) -> f64 {
+    let of = |c: nalgebra::Cholesky<f64, nalgebra::Dyn>| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+    m.clone().cholesky().map_or(f64::NEG_INFINITY, |c| 2.0 * of(c))
 }
 
 /// Rows that are one stop: which, and how many.
@@ -70,37 +108,61 @@ fn stops(instrument: &Instrument, rows: &[u32]) -> Vec<(u32, usize)> {
 }
 
 /// Whether a fit has it: no angle beyond the limit, not in the shadow.
-fn counts((wi, wo): Pair, instrument: &Instrument) -> bool {
+pub(super) fn counts((wi, wo): Pair, instrument: &Instrument) -> bool {
     let most = MAX_ANGLE_DEG.to_radians() + 1e-9;
     theta_of(wi) <= most && theta_of(wo) <= most && !may_be_shadowed(wi, wo, instrument)
 }
 
-/// The information of all stops at one draw of the parameters.
-fn at(model: &Model, noise: &Noise<'_>, draw: &[f64], stops: &[(Pair, usize)]) -> DMatrix<f64> {
+/// What all stops tell at one draw of the parameters: pairs with the numbers of rows of their stops.
+fn at(model: &Model, (noise, kept): (&Noise<'_>, &Kept<'_>), draw: &[f64], pairs: &[(Pair, Vec<usize>)]) -> Told {
     let p = model.parameters();
-    let (mut list, mut weights) = (Vec::with_capacity(stops.len() * p), Vec::with_capacity(stops.len()));
+    let (mut list, mut weights) = (Vec::with_capacity(pairs.len() * p), Vec::with_capacity(pairs.len()));
     let mut gradient = vec![0.0; p];
-    for (pair, rows) in stops {
+    let mut shared = DMatrix::zeros(p, kept.len());
+    let truth = |wi, wo, out: &mut [f64]| {
+        out[0] = model.value(draw, (wi, wo), &mut vec![0.0; p]);
+        true
+    };
+    for (pair, stops) in pairs {
         let f = model.value(draw, *pair, &mut gradient);
         let Some(own) = noise.variance(f, *pair) else { continue };
+        let jitter = noise.jitter(model, draw, f, *pair);
+        let weight: f64 = stops.iter().map(|rows| 1.0 / (own / *rows as f64 + jitter)).sum();
+        for (k, u) in kept.components(*pair, f, &truth).into_iter().enumerate() {
+            (0..p).for_each(|a| shared[(a, k)] += weight * gradient[a] * u);
+        }
         list.extend_from_slice(&gradient);
-        weights.push(1.0 / (own / *rows as f64 + noise.jitter(model, draw, f, *pair)));
+        weights.push(weight);
     }
-    information(p, &list, &weights)
+    Told { own: information(p, &list, &weights), shared }
 }
 
-/// √ of the diagonal of the inverse; infinite where the information is singular.
-fn relative_errors(m: &DMatrix<f64>) -> Vec<f64> {
-    let diagonal: Vec<f64> = m.diagonal().iter().map(|d| d.sqrt()).collect();
-    let open = vec![f64::INFINITY; diagonal.len()];
-    if diagonal.contains(&0.0) {
-        return open;
+impl Told {
+    /// What shared errors of 1 σ move the parameters by, A⁻¹ G, and the diagonal of A⁻¹; nothing where A is singular.
+    fn solved(&self) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let m = &self.own;
+        let diagonal: Vec<f64> = m.diagonal().iter().map(|d| d.sqrt()).collect();
+        if diagonal.contains(&0.0) {
+            return None;
+        }
+        // Scaled to a diagonal of ones: weights and exponents may differ by many decades.
+        let scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |a, b| m[(a, b)] / (diagonal[a] * diagonal[b]));
+        let inverse = scaled.cholesky()?.inverse();
+        let inverse = DMatrix::from_fn(m.nrows(), m.ncols(), |a, b| inverse[(a, b)] / (diagonal[a] * diagonal[b]));
+        Some((inverse.diagonal().iter().copied().collect(), inverse * &self.shared))
     }
-    // Scaled to a diagonal of ones: weights and exponents may differ by many decades.
-    let scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |a, b| m[(a, b)] / (diagonal[a] * diagonal[b]));
-    match scaled.cholesky().map(|c| c.inverse()) {
-        Some(inverse) => diagonal.iter().zip(inverse.diagonal().iter()).map(|(d, v)| v.sqrt() / d).collect(),
-        None => open,
+
+    /// Standard errors: √ of the diagonal of A⁻¹ + A⁻¹ G Gᵀ A⁻¹; infinite where A is singular.
+    fn relative_errors(&self) -> Vec<f64> {
+        let Some((own, moved)) = self.solved() else { return vec![f64::INFINITY; self.own.nrows()] };
+        own.iter().enumerate().map(|(a, v)| (v + moved.row(a).norm_squared()).sqrt()).collect()
+    }
+
+    /// Minus ln det of that covariance: ln det A − ln det(1 + Gᵀ A⁻¹ G).
+    fn ln_sure(&self) -> f64 {
+        let Some((_, moved)) = self.solved() else { return f64::NEG_INFINITY };
+        let more = DMatrix::identity(moved.ncols(), moved.ncols()) + self.shared.transpose() * moved;
+        ln_det(&self.own) - ln_det(&more)
     }
 }
 

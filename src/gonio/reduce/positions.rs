@@ -173,6 +173,40 @@ pub(super) fn of_reference(instrument: &Instrument, dimension: Dimension) -> f64
     list.iter().map(|(u, q)| u * u + 3.0 * q * q).sum::<f64>().sqrt()
 }
 
+/// What an instrument's kept errors do to readings of a model: those of positions to first and second order, and the certificate's.
+pub(in crate::gonio) struct Kept<'a> {
+    optics: Optics<'a>,
+    errors: Vec<Off>,
+    reference: Vec<(f64, f64)>,
+}
+
+impl<'a> Kept<'a> {
+    pub fn of(instrument: &'a Instrument) -> Self {
+        let mut errors = errors(instrument, Dimension::Space);
+        errors.retain(|(family, _, _)| *family != JITTER);
+        let optics = Optics::new(instrument, Dimension::Space);
+        let reference = optics.of_reference(&errors);
+        Self { optics, errors, reference }
+    }
+
+    /// 1 σ of each in a reading of value `f` at a pair of directions, 1/sr; of an error's square, whose mean square is 3 q², one more.
+    pub fn components(&self, pair: (DVec3, DVec3), f: f64, model: &Truth<'_>) -> Vec<f64> {
+        let scale = self.optics.scale(pair);
+        let (_, list) = self.optics.moved(pair, &self.errors, model, 1);
+        let certificate = f * self.optics.instrument.reference.reflectance_u;
+        let of_positions = list.iter().zip(&self.reference).flat_map(|(of, (of_u, of_q))| {
+            let (u, q) = of[0];
+            [scale * u - f * of_u, 3f64.sqrt() * (scale * q - f * of_q)]
+        });
+        of_positions.chain([certificate]).collect()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        2 * self.errors.len() + 1
+    }
+}
+
 /// How often the axes stopped at each pair of directions.
 fn approaches(raw: &Raw) -> Vec<f64> {
     let mut count = vec![0.0; raw.directions.len()];
