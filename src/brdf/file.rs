@@ -349,9 +349,9 @@ fn read_lobe(lobe: FileLobe, index: usize, channels: usize) -> Result<Option<Lob
     let mut shape = Vec::new();
     for parameter in parameters {
         let name = field(&format!("shape.{}", parameter.name));
-        let (least, most) = parameter.bounds;
-        // A fit at the end of its range may have been rounded beyond it.
-        let is_possible = |x: f64| (least * (1.0 - ROUNDING)..=most * (1.0 + ROUNDING)).contains(&x);
+        // Below what a fit looks for a lobe is still one, down to 0; one at the end of its range may have been rounded beyond it.
+        let (_, most) = parameter.bounds;
+        let is_possible = |x: f64| (0.0..=most * (1.0 + ROUNDING)).contains(&x);
         let value = values.get(parameter.name).cloned().unwrap_or(Value::Null);
         let read = serde_json::from_value::<PerChannel<f64>>(value.clone()).ok().filter(|v| match v {
             PerChannel::Shared(x) => is_possible(*x),
@@ -359,7 +359,7 @@ fn read_lobe(lobe: FileLobe, index: usize, channels: usize) -> Result<Option<Lob
         });
         shape.push(read.ok_or_else(|| MaterialError::Field {
             field: name,
-            expected: format!("a number from {least} to {most:e}, or {channels} of them"),
+            expected: format!("a number from 0 to {most:e}, or {channels} of them"),
             found: value.to_string(),
         })?);
     }
@@ -419,7 +419,7 @@ mod tests {
             (
                 "312.5",
                 "1e9",
-                "lobes[1].shape.exponent: expected a number from 0.01 to 1e8, or 2 of them, found 1000000000.0",
+                "lobes[1].shape.exponent: expected a number from 0 to 1e8, or 2 of them, found 1000000000.0",
             ),
             ("312.5", "1.0001e8", "lobes[1].shape.exponent"),
             ("312.5", "[1, 1e9]", "lobes[1].shape.exponent"),

@@ -43,8 +43,9 @@ impl Tables {
         tables
     }
 
-    /// The table for exponent `n` > 0.
+    /// The table for exponent `n`; that of next to nothing for 0.
     pub fn at(&self, n: f64) -> Arc<Seen> {
+        let n = n.max(LEAST);
         let recent = || self.recent.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, seen)) = recent().iter().find(|(key, _)| *key == n.to_bits()) {
             return Arc::clone(seen);
@@ -100,6 +101,8 @@ fn pair(of: [f64; 4]) -> [Jet; 2] {
     [[of[0], of[2]], [of[1], of[3]]]
 }
 
+/// Exponents below this are this.
+const LEAST: f64 = 1e-6;
 /// ln of the share of its peak below which a lobe is nothing.
 const NOTHING: f64 = -80.0;
 /// Width of the pieces at an edge in units of the lobe's, 1/√n; the share of its distance from the nearest edge that a piece may have; rad.
