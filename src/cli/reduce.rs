@@ -100,7 +100,8 @@ fn summary(out: &Path, raw: &Raw, reduction: &Reduction, valid: u64) -> String {
         counted(table.common.len() as u64, "shared component")
     );
     // Writing to a String can't fail.
-    let _ = write!(text, "\n  {:<34} type   rms [1/sr]   of a reading (median)", "component, one σ");
+    let rms = format!("rms [{}]", unit(table.dimension));
+    let _ = write!(text, "\n  {:<34} type {rms:>12}   of a reading (median)", "component, one σ");
     for line in reduction.budget.lines.iter().map(unsigned) {
         let kind = if line.name == TOTAL { "" } else { line.kind.name() };
         let _ = write!(text, "\n  {:<34} {kind:<4} {:>12.3e}   {:>8.3} %", line.name, line.rms, 100.0 * line.relative);
@@ -110,6 +111,11 @@ fn summary(out: &Path, raw: &Raw, reduction: &Reduction, valid: u64) -> String {
 
 const TOTAL: &str = "all together";
 
+/// The BRDF's unit.
+fn unit(dimension: Dimension) -> &'static str {
+    if dimension == Dimension::Flat { "1/rad" } else { "1/sr" }
+}
+
 /// What each component brings to each reading.
 fn by_reading(raw: &Raw, reduction: &Reduction) -> String {
     let (table, lines) = (&reduction.measurement, &reduction.budget.lines);
@@ -118,9 +124,9 @@ fn by_reading(raw: &Raw, reduction: &Reduction) -> String {
     let angles = if is_flat { "theta_i_deg,theta_o_deg" } else { "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg" };
     let mut text = format!("{angles},channel,value");
     for line in parts {
-        let _ = write!(text, ",{} ({}) [1/sr]", line.name, line.kind.name());
+        let _ = write!(text, ",{} ({}) [{}]", line.name, line.kind.name(), unit(table.dimension));
     }
-    text.push_str(",all together [1/sr]\n");
+    let _ = writeln!(text, ",all together [{}]", unit(table.dimension));
     for i in 0..table.len() {
         let (wi, wo) = raw.directions.pair(i);
         for (c, channel) in table.channels.iter().enumerate() {
