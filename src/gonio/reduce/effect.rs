@@ -37,14 +37,10 @@ impl Effect {
         bent / (linear + bent)
     }
 
-    /// Factors of both, so that they add up to the whole.
-    fn factors(&self, kept: usize) -> (f64, f64) {
+    /// The factor of both that makes them the whole.
+    fn factor(&self, kept: usize) -> f64 {
         let (linear, bent) = self.variances(kept);
-        match self.whole {
-            Some(whole) if whole < linear => (whole / linear, 0.0),
-            Some(whole) if bent > 0.0 => (1.0, (whole - linear) / bent),
-            _ => (1.0, 1.0),
-        }
+        self.whole.filter(|_| linear + bent > 0.0).map_or(1.0, |whole| whole / (linear + bent))
     }
 }
 
@@ -116,16 +112,16 @@ pub(super) fn draw(
 pub(super) fn place_all(list: &[(usize, Effect)], errors: &[Off], shared: &mut Shared<'_>) {
     let kept = kept(errors);
     for (place, effect) in list {
-        let (of_linear, of_bent) = effect.factors(kept);
+        let factor = effect.factor(kept);
         for (k, ((family, _, _), (u, q))) in errors.iter().zip(&effect.parts).enumerate() {
             if k >= kept {
-                shared.add_own(*family, *place, of_linear * u * u + of_bent * 3.0 * q * q);
+                shared.add_own(*family, *place, factor * (u * u + 3.0 * q * q));
                 continue;
             }
-            shared.add(*family, (k, 0), *place, of_linear.sqrt() * u);
+            shared.add(*family, (k, 0), *place, factor.sqrt() * u);
             match &effect.bend {
-                Some(bend) => shared.attribute(*family, *place, of_bent * bend.variance_of(k)),
-                None => shared.add_own(*family, *place, of_bent * 3.0 * q * q),
+                Some(bend) => shared.attribute(*family, *place, factor * bend.variance_of(k)),
+                None => shared.add_own(*family, *place, factor * 3.0 * q * q),
             }
         }
     }
@@ -137,8 +133,8 @@ fn place_bent(list: &[(usize, Effect)], kept: usize, shared: &mut Shared<'_>) {
     let bent: Vec<(usize, Bend, f64)> = list
         .iter()
         .filter_map(|(place, effect)| {
-            let (of_linear, of_bent) = effect.factors(kept);
-            Some((*place, effect.bend.as_ref()?.scaled(of_bent.sqrt()), of_linear * effect.variances(kept).0))
+            let factor = effect.factor(kept);
+            Some((*place, effect.bend.as_ref()?.scaled(factor.sqrt()), factor * effect.variances(kept).0))
         })
         .collect();
     let (planes, own) = bend::components(&bent.iter().map(|(_, b, first)| (b, *first)).collect::<Vec<_>>());
