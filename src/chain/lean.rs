@@ -27,7 +27,7 @@ pub(super) fn sigma(instrument: &Instrument) -> f64 {
 }
 
 /// The readings as a sample with this lean met them.
-pub(super) fn turned(readings: &Measurement, turn: DQuat) -> Measurement {
+fn turned(readings: &Measurement, turn: DQuat) -> Measurement {
     let n = readings.len();
     let (wi, wo): (Vec<DVec3>, Vec<DVec3>) =
         (0..n).map(|i| readings.directions.pair(i)).map(|(i, o)| (turn * i, turn * o)).unzip();
@@ -101,6 +101,15 @@ fn of_highest(readings: &Measurement) -> Option<[f64; 2]> {
     Some([normal.x, normal.y])
 }
 
+/// What the model reads at a pair of directions; nothing below the horizon.
+fn value(model: &Surrogate, (wi, wo): (DVec3, DVec3), width: usize) -> Vec<f64> {
+    let mut out = vec![0.0; width];
+    if wi.z > 0.0 && wo.z > 0.0 {
+        model.write_value(wi, wo, &mut out);
+    }
+    out
+}
+
 /// Residual, and its slopes by the lean, of every valid value.
 fn rows<'a>(
     readings: &'a Measurement,
@@ -113,14 +122,7 @@ fn rows<'a>(
         [[0.0, 0.0], [step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]].map(|[x, y]| lean([at[0] + x, at[1] + y]));
     (0..readings.len()).flat_map(move |i| {
         let (wi, wo) = readings.directions.pair(i);
-        let values = frames.map(|turn| {
-            let mut out = vec![0.0; width];
-            let (wi, wo) = (turn * wi, turn * wo);
-            if wi.z > 0.0 && wo.z > 0.0 {
-                model.write_value(wi, wo, &mut out);
-            }
-            out
-        });
+        let values = frames.map(|turn| value(model, (turn * wi, turn * wo), width));
         (0..width).filter_map(move |c| {
             let slope = |k: usize| (values[k][c] - values[k + 1][c]) / (2.0 * step);
             Some((readings.value(c, i)? - values[0][c], Vector2::new(slope(1), slope(3))))
@@ -130,7 +132,13 @@ fn rows<'a>(
 
 /// Sum of squares.
 fn misfit(readings: &Measurement, model: &Surrogate, at: [f64; 2]) -> f64 {
-    rows(readings, model, at, 1e-6).map(|(r, _)| r * r).sum()
+    let (width, turn) = (readings.channels.len(), lean(at));
+    let of = |i: usize| {
+        let (wi, wo) = readings.directions.pair(i);
+        let read = value(model, (turn * wi, turn * wo), width);
+        (0..width).filter_map(move |c| Some((readings.value(c, i)? - read[c]).powi(2)))
+    };
+    (0..readings.len()).flat_map(of).sum()
 }
 
 /// The lean after one Gauss–Newton step, with the prior that it is 0 ± σ.

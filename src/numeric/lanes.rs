@@ -161,7 +161,7 @@ impl<S: Simd> Lanes<S> {
         of.at_least(self.number(0.0)).select(size, -size)
     }
 
-    /// A cubic polynomial's like: the coefficients from the highest power down.
+    /// A polynomial, its coefficients from the highest power down.
     #[inline(always)]
     fn horner(self, coefficients: &[f64]) -> Self {
         let mut sum = self.number(0.0);

@@ -37,7 +37,9 @@ pub fn stream(seed: u64, purpose: Purpose, index: u64) -> Stream {
 }
 
 /// The finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection in which every input bit moves every output bit.
-fn mix(mut z: u64) -> u64 {
+#[inline(always)]
+#[must_use]
+pub fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)

@@ -11,7 +11,7 @@ use crate::geometry::Frame;
 use crate::numeric::random::{RngExt, Stream};
 
 /// Scattering events before paths may end by chance.
-const ROULETTE_AFTER: u32 = 5;
+pub(super) const ROULETTE_AFTER: u32 = 5;
 
 /// Which directions find the lights that have a surface, and the environment. All three have the same expected value;
 /// they differ in noise.
@@ -104,8 +104,7 @@ impl Path {
 impl<'a> Tracer<'a> {
     /// A tracer for a scene.
     pub fn new(scene: &'a Scene, strategy: Strategy) -> Self {
-        let surfaces = scene.lights.iter().any(super::lights::Light::has_surface);
-        let rays_find_light = (surfaces || scene.environment.is_some()) && strategy != Strategy::LightsOnly;
+        let rays_find_light = scene.rays_find_light() && strategy != Strategy::LightsOnly;
         Self { scene, strategy, rays_find_light }
     }
 

@@ -60,10 +60,8 @@ pub(super) fn effects(
 ) -> Vec<Effect> {
     let scale = optics.scale(pair);
     let (_, list) = optics.moved(pair, errors, model, values.len());
-    // Where the axes stop at the reference is noise of its visit.
-    let at_reference = |k: usize| if errors[k].0 == JITTER { (0.0, 0.0) } else { reference[k] };
     let part = |c: usize, value: f64, k: usize| {
-        let ((u, q), (of_u, of_q)) = (list[k][c], at_reference(k));
+        let ((u, q), (of_u, of_q)) = (list[k][c], reference[k]);
         if errors[k].0 == JITTER {
             // What moves is divided by the stops, and so is the scatter of what bends, but not its mean.
             return (scale * u / stops.sqrt(), scale * q * ((2.0 / stops + 1.0) / 3.0).sqrt());
@@ -100,9 +98,7 @@ pub(super) fn draw(
     model: &Truth<'_>,
     values: &[f64],
 ) {
-    // Where the axes stop at the reference is noise of its visit.
-    let of_reference = |(k, of): (usize, &(f64, f64))| if errors[k].0 == JITTER { 0.0 } else { of.0 };
-    let relative: Vec<f64> = reference.iter().enumerate().map(of_reference).collect();
+    let relative: Vec<f64> = reference.iter().map(|(u, _)| *u).collect();
     let whole = spread::variances(optics, pair, (errors, heights), &relative, model, values);
     let bent = effects.iter_mut().zip(whole).filter(|(e, _)| e.share(kept(errors)) > BENT);
     bent.for_each(|(e, v)| e.whole = Some(v));

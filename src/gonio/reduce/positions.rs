@@ -223,7 +223,9 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
     }
     let (n, width) = (raw.directions.len(), raw.channels.len());
     let optics = Optics::new(instrument, raw.dimension);
-    let reference = optics.of_reference(&errors);
+    // Where the axes stop at the reference is noise of its visit.
+    let mut reference = optics.of_reference(&errors);
+    reference[kept(&errors)..].fill((0.0, 0.0));
     let values = |entry: usize| -> Vec<f64> { (0..width).map(|c| table.values[c * n + entry]).collect() };
     let valid: Vec<usize> = (0..n).filter(|e| values(*e).iter().any(|v| v.is_finite())).collect();
     let approaches = approaches(raw);

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::super::lights::{Environment, Light, QuadLight};
 use super::super::material::Material;
-use super::super::ray::gamma;
 use super::super::scene::Scene;
 use super::super::shapes::{Owner, Sphere};
 
@@ -48,6 +47,8 @@ pub(in crate::render) struct FlatScene<'a> {
     pub(super) lights: &'a [Light],
     pub(super) environment: Option<DVec3>,
     pub(super) max_bounces: u32,
+    /// Whether a ray can find light at all.
+    pub(super) rays_find_light: bool,
     /// Phong lobes of the material that has most.
     pub(super) lobes: usize,
 }
@@ -89,6 +90,7 @@ impl<'a> FlatScene<'a> {
             lights: &scene.lights,
             environment,
             max_bounces: scene.max_bounces,
+            rays_find_light: scene.rays_find_light(),
         })
     }
 
@@ -97,32 +99,24 @@ impl<'a> FlatScene<'a> {
         self.spheres.len() + self.pieces.len() > 1
     }
 
-    /// Whether a ray can find light at all.
-    pub fn rays_find_light(&self) -> bool {
-        self.environment.is_some() || self.lights.iter().any(Light::has_surface)
-    }
-
     /// The lights that have a surface, with their owner's number.
     pub(super) fn shining(&self) -> impl Iterator<Item = (OwnerNumber, &'a QuadLight)> {
         self.lights.iter().enumerate().filter_map(|(i, light)| match light {
-            Light::Quad(quad) => Some((-1.0 - i as f64, quad)),
+            Light::Quad(quad) => Some((light_number(i), quad)),
             _ => None,
         })
-    }
-}
-
-impl Piece {
-    /// Bound on what a point that was put onto it is off by, coordinates up to `largest`, m.
-    pub fn error_per_metre() -> f64 {
-        gamma(32)
     }
 }
 
 fn number(owner: Owner) -> OwnerNumber {
     match owner {
         Owner::Material(i) => i as f64,
-        Owner::Light { light, .. } => -1.0 - f64::from(light),
+        Owner::Light { light, .. } => light_number(light as usize),
     }
+}
+
+fn light_number(light: usize) -> OwnerNumber {
+    -1.0 - light as f64
 }
 
 fn lobes(material: &Material) -> Option<Lobes> {

@@ -5,17 +5,17 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::super::camera::Camera;
+use super::super::integrator::ROULETTE_AFTER;
 use super::super::lights::Light;
 use super::flat::FlatScene;
 use super::lights::{Arrivals, between, from_quad, quad_pdf};
 use super::lobes::{Frames, LobesAt, cosine_hemisphere};
-use super::points::{Points, mix};
+use super::points::Points;
 use super::shapes::{Points3, Rays};
 use crate::numeric::lanes::{Mask, Vec3};
+use crate::numeric::random::mix;
 use crate::numeric::simd::{Eight, Kernel, LANES, Lanes, Simd, vectorised};
 
-/// Scattering events before paths may end by chance.
-const ROULETTE_AFTER: u32 = 5;
 /// Decisions of one scattering event besides those of its lights: environment, direction, lobe and roulette.
 const OF_EVENT: u32 = 4;
 
@@ -36,7 +36,7 @@ impl Plan {
         let alone = !scene.sees_itself();
         Self {
             shadows: !alone,
-            bounces: scene.rays_find_light() || !alone && scene.max_bounces > 1,
+            bounces: scene.rays_find_light || !alone && scene.max_bounces > 1,
             glossy: scene.lobes > 0,
         }
     }
@@ -158,7 +158,7 @@ impl<const SHADOWS: bool, const BOUNCES: bool, const GLOSSY: bool> One<'_, SHADO
         for bounce in 0..=scene.max_bounces {
             let Some(vertices) = self.arrive(&rays, bounce, &mut state) else { break };
             self.add_direct(&vertices, bounce, &mut state);
-            let last = bounce + 1 == scene.max_bounces && !scene.rays_find_light();
+            let last = bounce + 1 == scene.max_bounces && !scene.rays_find_light;
             if !BOUNCES || last {
                 break;
             }

@@ -4,6 +4,7 @@
 //! and scrambling of the digits (Burley 2020, J. Computer Graphics Techniques 9(4); the hash by Vegdahl 2021), so decisions are independent of
 //! each other and each one's points are as even as can be. Digits are 32 bits.
 
+use crate::numeric::random::mix;
 use crate::numeric::simd::{Eight, LANES};
 
 /// Indices or digits side by side.
@@ -56,14 +57,6 @@ fn unit(digits: Words) -> Eight {
         points[k] = (f64::from(digits[k]) + 0.5) * (1.0 / 4_294_967_296.0);
     }
     points
-}
-
-/// The finaliser of SplitMix64 (Steele, Lea, Flood 2014).
-#[inline(always)]
-pub(super) fn mix(mut z: u64) -> u64 {
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// Owen's scrambling of digits that stand in reverse order.

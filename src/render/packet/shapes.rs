@@ -155,7 +155,7 @@ fn round_or_flat<S: Simd>(
     let (twelve, two) = (radius.number(gamma(12)), radius.number(gamma(2)));
     let of_sphere = relative.abs().scaled_plus(twelve, on_sphere.abs() * two);
     let on_piece = normal.scaled_plus(-(p - point).dot(normal), p);
-    let flat = (on_piece.abs().largest() + reach) * radius.number(Piece::error_per_metre());
+    let flat = (on_piece.abs().largest() + reach) * radius.number(gamma(32));
     Points3 {
         position: round.select3(on_sphere, on_piece),
         error: round.select3(of_sphere, Vec3::new(flat, flat, flat)),

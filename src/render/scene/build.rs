@@ -55,6 +55,11 @@ impl Scene {
         })
     }
 
+    /// Whether a ray can find light at all.
+    pub(crate) fn rays_find_light(&self) -> bool {
+        self.environment.is_some() || self.lights.iter().any(Light::has_surface)
+    }
+
     /// Name of the scene.
     #[must_use]
     pub fn name(&self) -> &str {
