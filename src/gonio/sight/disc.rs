@@ -17,7 +17,7 @@ pub(super) type Jet = [f64; 2];
 const NARROW: f64 = 1.5;
 /// Distance of r from the rim, in widths 1/√n of the lobe, from which on dφ is slow enough.
 const CLEAR: f64 = 3.0;
-/// Steps on half of the rim, and the share of it, in widths of the lobe, on which most of them lie: 4e-13 for any n, disc and α.
+/// Steps on half of the rim, and the share of it, in widths of the lobe, on which most of them lie: enough for any n, disc and α.
 const STEPS: usize = 40;
 const NEAR: f64 = 3.0;
 /// Shares and multiples of a softening e, so that powers of e up to the second cancel.
