@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use goniofit::control::Control;
 use goniofit::image::{Image, compare, read_exr};
 use goniofit::render::scene::{PhongLobeSpec, builtin};
-use goniofit::render::{Materials, Options, Scene, SceneSpec, render};
+use goniofit::render::{Film, Materials, Options, Scene, SceneSpec, render};
 
 const SHRINK: usize = 8;
 
@@ -87,23 +87,31 @@ fn variance_nearby(image: &Image) -> Vec<[f64; 3]> {
     (0..errors.len()).map(|i| [0, 1, 2].map(|c| pooled(i, c))).collect()
 }
 
-/// The picture with the largest of its own variance, that nearby and that of its edges; the reference, which states none, with the same for its own number of samples, and 10⁻⁶ of the value.
+/// The picture with the largest of its own variance, that nearby and that of its edges; the reference, which states none, with that of the picture's single samples over
+/// its own number of them, or with that of the edges, and 10⁻⁶ of the value.
 fn with_noise(
-    image: &Image,
+    film: &Film,
     reference: &Image,
     edges: &[[f64; 3]],
     samples: f64,
     reference_samples: f64,
 ) -> (Image, Image) {
+    let image = film.to_image();
     let own = image.standard_error.as_ref().expect("rendered");
-    let nearby = variance_nearby(image);
+    let nearby = variance_nearby(&image);
     let largest = |i: usize, c: usize| own[i][c].powi(2).max(nearby[i][c]).max(edges[i][c] / samples).sqrt();
     let errors: Vec<[f64; 3]> = (0..own.len()).map(|i| [0, 1, 2].map(|c| largest(i, c))).collect();
-    let shrunk = (samples / reference_samples).sqrt();
-    let theirs =
-        errors.iter().zip(&reference.radiance).map(|(e, r)| [0, 1, 2].map(|c| (e[c] * shrunk).hypot(1e-6 * r[c])));
-    let theirs = Image { standard_error: Some(theirs.collect()), ..reference.clone() };
-    (Image { standard_error: Some(errors), ..image.clone() }, theirs)
+    let single = |i: usize| {
+        let at = |n: usize| u32::try_from(n).expect("a small picture");
+        film.sample_deviation(at(i % image.width), at(i / image.width)).expect("a pixel")
+    };
+    let theirs = |i: usize| {
+        let deviation = single(i);
+        let variance = |c: usize| (deviation[c] * deviation[c]).max(edges[i][c]) / reference_samples;
+        [0, 1, 2].map(|c| variance(c).sqrt().hypot(1e-6 * reference.radiance[i][c]))
+    };
+    let theirs = Image { standard_error: Some((0..own.len()).map(theirs).collect()), ..reference.clone() };
+    (Image { standard_error: Some(errors), ..image }, theirs)
 }
 
 /// Renders the scene and tests every pixel, and every block of 4 × 4 of them, against the reference at 1 %. Answers whether
@@ -113,10 +121,10 @@ fn agrees(file: &str, spec: &SceneSpec, samples: u32, reference_samples: f64) ->
     let built = Scene::build(spec, Path::new("."), &Materials::new()).expect("builds");
     let size = (full.width / SHRINK) as u32;
     let options = Options { width: size, height: size, samples, seed: 7, ..Options::default() };
-    let image = render(&built, &options, Control::silent()).expect("renders").to_image();
+    let film = render(&built, &options, Control::silent()).expect("renders");
     let edges = variance_of_edges(&full, SHRINK);
     let per_large_pixel = reference_samples * (SHRINK * SHRINK) as f64;
-    let (image, reference) = with_noise(&image, &shrink(&full, SHRINK), &edges, f64::from(samples), per_large_pixel);
+    let (image, reference) = with_noise(&film, &shrink(&full, SHRINK), &edges, f64::from(samples), per_large_pixel);
     let agree = [1, 4].map(|blocks| {
         let comparison = compare(&shrink(&image, blocks), &shrink(&reference, blocks)).expect("same size");
         let s = comparison.significance.expect("noise is known");

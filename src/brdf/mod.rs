@@ -34,7 +34,8 @@ pub trait Brdf: Send + Sync {
     /// directions outside of what was measured.
     fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool;
 
-    /// Draws `wi` for a given `wo` from three numbers uniform in [0, 1); `None` where the draw fell below the horizon, or
+    /// Draws `wi` for a given `wo` from three numbers uniform in [0, 1): the first chooses a part, a lobe say, the point of the
+    /// others a direction, so that even points give even directions; `None` where the draw fell below the horizon, or
     /// `wo` is: such a draw counts as one that carries nothing.
     fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<Sample>;
 

@@ -14,6 +14,7 @@ mod measure;
 mod output;
 mod pictures;
 mod scatter;
+mod scene_effects;
 mod source;
 mod surrogate;
 
@@ -24,4 +25,5 @@ pub use library::{BuiltInMaterial, MATERIALS};
 pub use measure::{measure, measure_raw, reduced, reduced_until, tabulate, with_job};
 pub use pictures::{Stage, picture, picture_of};
 pub use scatter::{Scatter, integrated_scatter};
+pub use scene_effects::{SceneEffect, SceneEffects, scene_effects};
 pub use source::{Source, load, load_material, render_material, shown_channels};

@@ -39,6 +39,12 @@ pub fn picture(
     options: &Options,
     control: Control<'_>,
 ) -> Result<Image, ChainError> {
+    let (scene, _) = scene_of(stage, subject)?;
+    Ok(render(&scene, options, control)?.to_image())
+}
+
+/// The stage's scene with `subject` in the place of its replaceable material, and the materials that were given to it.
+pub(super) fn scene_of(stage: &Stage, subject: Option<Material>) -> Result<(Scene, Materials), ChainError> {
     let mut materials = Materials::new();
     if let Some(subject) = subject {
         let Some(slot) = &stage.spec.subject else {
@@ -55,8 +61,7 @@ pub fn picture(
             materials.insert(name.to_owned(), render_material(&path, &load(&path, &ReadOptions::default())?, None)?);
         }
     }
-    let scene = Scene::build(&stage.spec, &stage.base, &materials)?;
-    Ok(render(&scene, options, control)?.to_image())
+    Ok((Scene::build(&stage.spec, &stage.base, &materials)?, materials))
 }
 
 /// Renders what a name or file stands for.

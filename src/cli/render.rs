@@ -1,19 +1,26 @@
 //! `goniofit render`: one picture.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde_json::json;
 
 use super::failure::Failure;
+use super::fit::{parse_time, parse_tolerance};
 use super::output::{check_folder, distinct_outputs, keeps_inputs, read_text, stdout_is_free, write_bytes};
-use super::ui::{self, Ui};
+use super::ui::{self, Ui, significant};
 use crate::chain::{self, Stage};
 use crate::image::{Image, LayerKind, develop, encode_exr, encode_png, exposure_for};
 use crate::render::{LayerSet, Options, SceneSpec};
 
+/// About what a value of a picture takes to be written, s: this much of a time budget is kept for that.
+const WRITING: f64 = 2.5e-8;
+
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit render --scene sphere-on-plane --material gold.json --out gold.exr --png gold.png
+  goniofit render --scene cornell --target-error 2% --out cornell.exr
+  goniofit render --scene cornell --time-budget 5s --out cornell.exr --png cornell.png
   goniofit render my-scene.toml --samples 256 --out picture.exr --layers albedo,normal,depth")]
 pub(super) struct Args {
     /// A scene file; `-` is stdin
@@ -33,6 +40,12 @@ pub(super) struct Args {
     /// Exposure of the preview, stops (default: the brightest 1 % clips)
     #[arg(long, allow_negative_numbers = true, requires = "png", value_parser = parse_exposure)]
     exposure: Option<f64>,
+    /// Relative error that the picture may have, 1% say: renders until it is met with 95 % confidence, most where it is noisy
+    #[arg(long, value_name = "E", value_parser = parse_tolerance)]
+    target_error: Option<f64>,
+    /// Time from the program's start to the picture (500ms, 5s, 2m): the best within that
+    #[arg(long, value_name = "T", value_parser = parse_time)]
+    time_budget: Option<Duration>,
     /// Further layers of the linear picture: albedo, normal, depth, samples, direct, indirect
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', value_parser = parse_layer)]
     layers: Vec<LayerKind>,
@@ -71,7 +84,7 @@ fn parse_layer(text: &str) -> Result<LayerKind, String> {
         .ok_or_else(|| format!("expected layers out of {}", LayerSet::NAMED.map(|(name, _)| name).join(", ")))
 }
 
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
+pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let side = |t: &str| t.parse::<u32>().ok().filter(|v| (1..=16384).contains(v));
     let pair = text.split_once('x').map_or_else(|| side(text).map(|s| (s, s)), |(w, h)| side(w).zip(side(h)));
     pair.ok_or_else(|| "expected WIDTHxHEIGHT or one number, 1 to 16384".into())
@@ -99,6 +112,24 @@ impl PictureArgs {
     }
 }
 
+impl Args {
+    /// Whether pixels get as many samples as they need.
+    fn adapts(&self) -> bool {
+        self.target_error.is_some() || self.time_budget.is_some()
+    }
+
+    fn options(&self, stage: &Stage, ui: &Ui) -> Options {
+        let asked = self.picture.options(stage);
+        // Without a number, the target or the time says when it is enough.
+        let samples = if self.adapts() { self.picture.samples.unwrap_or(1 << 24) } else { asked.samples };
+        let planes = 7 + self.layers.len() * 3;
+        let writing =
+            Duration::from_secs_f64(WRITING * f64::from(asked.width) * f64::from(asked.height) * planes as f64);
+        let time_budget = self.time_budget.map(|time| time.saturating_sub(ui.elapsed()).saturating_sub(writing));
+        Options { samples, target_error: self.target_error, time_budget, layers: LayerSet::of(&self.layers), ..asked }
+    }
+}
+
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let outputs = [("--out", Some(&args.out)), ("--png", args.png.as_ref())];
     for (option, out) in outputs {
@@ -122,7 +153,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         stdout_is_free(png, ui)?;
         distinct_outputs(("--out", &args.out), ("--png", png))?;
     }
-    let options = Options { layers: LayerSet::of(&args.layers), ..args.picture.options(&stage) };
+    let options = args.options(&stage, ui);
     let image = match &args.material {
         Some(name) => chain::picture_of(name, args.picture.rgb.as_ref(), &stage, &options, ui.control())?,
         None => chain::picture(&stage, None, &options, ui.control())?,
@@ -135,6 +166,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     if ui::stop().requested() {
         ui.warn("stopped: the picture has fewer samples than asked for");
     }
+    let met = image.metadata.relative_error.is_some_and(|[_, most]| args.target_error.is_none_or(|t| most <= t));
+    if let (Some(target), false) = (args.target_error, met) {
+        ui.warn(&format!("the relative error asked for, {} %, was not reached", significant(100.0 * target)));
+    }
     let unknown = unknown_share(&image);
     if unknown > 0.0 {
         ui.warn(&format!(
@@ -143,16 +178,21 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ));
     }
     let (samples, seconds) = (image.metadata.samples.unwrap_or(0), image.metadata.seconds.unwrap_or(0.0));
-    let text = format!(
-        "{}: {} {}×{}, {samples} samples a pixel, {seconds:.2} s",
-        args.out.display(),
-        stage.spec.name,
-        image.width,
-        image.height
-    );
+    let Image { width, height, .. } = image;
+    let error = image.metadata.relative_error;
+    let noise = error.map_or(String::new(), |[relative, most]| {
+        let percent = |x: f64| significant(100.0 * x);
+        format!(", relative error {} % (95 % sure: below {} %)", percent(relative), percent(most))
+    });
+    let mean = image.metadata.mean_samples.unwrap_or(0.0);
+    let samples_text = if args.adapts() { format!("{mean:.1} (at least {samples})") } else { samples.to_string() };
+    let (out, name) = (args.out.display(), &stage.spec.name);
+    let text = format!("{out}: {name} {width}×{height}, {samples_text} samples a pixel, {seconds:.2} s{noise}");
     let object = json!({
-        "out": args.out, "png": args.png, "scene": stage.spec.name, "width": image.width, "height": image.height,
-        "samples": samples, "seconds": seconds, "seed": options.seed, "unmeasured_share": unknown, "mean": mean(&image),
+        "out": args.out, "png": args.png, "scene": stage.spec.name, "width": width, "height": height,
+        "samples": samples, "seconds": seconds, "seed": options.seed, "unmeasured_share": unknown, "mean_samples": image.metadata.mean_samples, "mean": mean_of(&image),
+        "relative_error": error.map(|e| e[0]), "relative_error_95": error.map(|e| e[1]), "target_error": args.target_error,
+        "target_met": args.target_error.map(|_| met), "time_budget": args.time_budget.map(|t| t.as_secs_f64()),
         "layers": image.layers.iter().map(|l| l.kind).collect::<Vec<_>>(),
     });
     let taken = [Some(&args.out), args.png.as_ref()].into_iter().flatten().any(|p| p.as_os_str() == "-");
@@ -163,7 +203,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 }
 
 /// The scene in a file, `-` being stdin.
-fn read_stage(path: &Path) -> Result<Stage, Failure> {
+pub(super) fn read_stage(path: &Path) -> Result<Stage, Failure> {
     let base = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let spec =
         SceneSpec::parse(&read_text(path)?, &path.display().to_string()).map_err(|e| match path.extension() {
@@ -191,7 +231,7 @@ fn unknown_share(image: &Image) -> f64 {
     (0..pixels).filter(|i| image.is_masked(*i)).count() as f64 / pixels.max(1) as f64
 }
 
-fn mean(image: &Image) -> [f64; 3] {
+fn mean_of(image: &Image) -> [f64; 3] {
     let n = image.radiance.len().max(1) as f64;
     std::array::from_fn(|c| image.radiance.iter().map(|p| p[c]).sum::<f64>() / n)
 }

@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -44,12 +44,18 @@ pub(super) struct Ui {
     json: bool,
     quiet: bool,
     bar: Bar,
+    start: Instant,
 }
 
 impl Ui {
     pub fn new(json: bool, quiet: bool) -> Self {
         let shown = !quiet && std::io::stderr().is_terminal();
-        Self { json, quiet, bar: Bar { shown, current: Mutex::new(None) } }
+        Self { json, quiet, start: Instant::now(), bar: Bar { shown, current: Mutex::new(None) } }
+    }
+
+    /// Time since the command began.
+    pub fn elapsed(&self) -> Duration {
+        self.start.elapsed()
     }
 
     /// Whether stdout holds one JSON object and nothing else.
@@ -157,7 +163,8 @@ impl Progress for Bar {
     fn start(&self, label: &str, total: u64) {
         self.with(|current| {
             let bar = ProgressBar::new(total).with_message(label.to_owned());
-            if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:30} {percent:>3} %  {elapsed} of {duration}")
+            if let Ok(style) =
+                ProgressStyle::with_template("{msg:24} {bar:30} {percent:>3} %  {elapsed} of {duration}  {prefix}")
             {
                 bar.set_style(style);
             }
@@ -170,6 +177,14 @@ impl Progress for Bar {
         self.with(|current| {
             if let Some(bar) = current {
                 bar.inc(steps);
+            }
+        });
+    }
+
+    fn tell(&self, state: &str) {
+        self.with(|current| {
+            if let Some(bar) = current {
+                bar.set_prefix(state.to_owned());
             }
         });
     }

@@ -17,6 +17,8 @@ pub trait Progress: Sync {
     fn start(&self, label: &str, total: u64);
     /// `steps` more steps of the current stage are done.
     fn advance(&self, steps: u64);
+    /// How good the current stage's result is by now, in a few words.
+    fn tell(&self, _state: &str) {}
     /// The current stage is over.
     fn finish(&self);
 }

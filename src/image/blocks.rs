@@ -146,24 +146,29 @@ pub(super) fn normal_of_student(t: f64, freedom: f64) -> f64 {
     (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * (freedom * (t * t / freedom).ln_1p()).sqrt()
 }
 
-/// Variance of every pixel: the larger of its own and the mean over the 3 × 3 known pixels about it, without those whose variance
-/// is not finite; 0 for an exact picture. NaN stays NaN.
+/// Variance of every pixel: the larger of its own and the mean of the three largest among the 3 × 3 known pixels about it, those
+/// that are not finite left out; 0 for an exact picture. NaN stays NaN.
 fn pooled_variance(image: &Image, known: &[bool]) -> Vec<[f64; 3]> {
     let Some(errors) = &image.standard_error else { return vec![[0.0; 3]; known.len()] };
     let near = |i: usize, end: usize| i.saturating_sub(1)..(i + 2).min(end);
     let pooled = |i: usize| {
-        let (mut sum, mut count) = ([0.0; 3], [0.0; 3]);
-        for y in near(i / image.width, image.height) {
-            for k in near(i % image.width, image.width).map(|x| y * image.width + x).filter(|k| known[*k]) {
-                for c in (0..3).filter(|c| errors[k][*c].is_finite()) {
-                    sum[c] += errors[k][c] * errors[k][c];
-                    count[c] += 1.0;
+        let columns = near(i % image.width, image.width);
+        let cells = near(i / image.width, image.height).flat_map(|y| columns.clone().map(move |x| y * image.width + x));
+        // The three largest so far, channel by channel.
+        let mut largest = [[0.0f64; 3]; 3];
+        for k in cells.filter(|k| known[*k]) {
+            for (c, top) in largest.iter_mut().enumerate() {
+                let mut value = errors[k][c] * errors[k][c];
+                if value.is_finite() {
+                    for kept in top {
+                        (*kept, value) = (kept.max(value), kept.min(value));
+                    }
                 }
             }
         }
         [0, 1, 2].map(|c| {
             let own = errors[i][c] * errors[i][c];
-            if own.is_nan() || count[c] == 0.0 { own } else { own.max(sum[c] / count[c]) }
+            if own.is_nan() { own } else { own.max(largest[c].iter().sum::<f64>() / 3.0) }
         })
     };
     (0..errors.len()).map(pooled).collect()

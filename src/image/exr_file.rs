@@ -156,6 +156,8 @@ mod tests {
                 samples: Some(64),
                 seconds: Some(0.1),
                 program: Some("goniofit 0.1.0".into()),
+                mean_samples: Some(6.5),
+                relative_error: Some([0.01, 0.011]),
                 plan: None,
             },
             layers: LayerKind::ALL.map(layer).to_vec(),

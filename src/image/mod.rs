@@ -68,12 +68,18 @@ pub struct Metadata {
     pub scene: Option<String>,
     /// Seed of the random numbers.
     pub seed: Option<u64>,
-    /// Samples per pixel.
+    /// Samples per pixel, of the pixel with the fewest.
     pub samples: Option<u32>,
+    /// The same on average.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_samples: Option<f64>,
     /// Rendering time, s.
     pub seconds: Option<f64>,
     /// Program and version.
     pub program: Option<String>,
+    /// How far off the picture is to be expected, relative, and at most with 95 % confidence (`render::PictureError`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_error: Option<[f64; 2]>,
     /// In one line, what was computed: how long paths are, how lights are found, which layers were gathered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan: Option<String>,

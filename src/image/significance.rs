@@ -20,8 +20,8 @@ const BLOCK: usize = 32;
 ///
 /// t = Σ (x − ref)/√Σ (σ² + σref²) over the block. A picture without standard errors counts as exact; half a unit in the last place of
 /// the 32-bit floats of a file counts as noise. σ is estimated from few samples with heavy tails, so it is taken with care:
-/// - σ² is the larger of the pixel's own and the mean over its 3 × 3 known neighbours: few samples may all miss an edge or a
-///   rare bright path, which the neighbours saw.
+/// - σ² is the larger of the pixel's own and the mean of the three largest among its 3 × 3 known neighbours: few samples may all miss
+///   an edge or a rare bright path, and an edge runs through two neighbours, which saw it.
 /// - t has Student's distribution with ν = (Σ σ²)²/Σ (σ⁴/(samples − 1)) degrees of freedom (Welch 1947; infinite where the number of
 ///   samples is not known), and z is the normal variate that is as improbable (Wallace 1959).
 /// - Values in which the pictures agree and that have no noise (a black sky) are not tested.

@@ -1,49 +1,60 @@
 //! The film: passes over the picture, and what every pixel has gathered.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::RenderError;
 use super::camera::Camera;
 use super::integrator::{PathResult, Strategy, Tracer, Watch};
 use super::layers::{Gathered, LayerSet, Sight, layer};
-use super::packet::{FlatScene, Found, Packets, Plan};
+use super::noise::{Noise, PictureError, standard_errors};
+use super::packet::{FlatScene, Found, Packets};
 use super::pixel::Pixel;
+use super::plan::Plan;
+use super::points::{Draws, key_of};
 use super::scene::{Scene, SceneSpec};
+use super::schedule::Schedule;
+use super::tiles::{TILE, TILE_ROOM, Tile, Tiles};
 use crate::control::Control;
 use crate::image::{Image, Metadata};
-use crate::numeric::random::RngExt;
 use crate::numeric::simd::LANES;
 
-/// Samples of a pixel in one pass at most.
+/// Samples that a tile's pixels get between two looks at the clock and the wish to stop.
 const PASS: u32 = 32;
 
 /// Pixels of a picture at most: 8192 × 8192, which takes about 12 GB, and with all of [`LayerSet::NAMED`] about 2.5 times that.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// What to render.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Width, pixels, 1 to 16384; width × height at most 2²⁶.
     pub width: u32,
     /// Height, pixels, 1 to 16384.
     pub height: u32,
-    /// Samples per pixel, 1 to 2²⁴.
+    /// Samples per pixel, 1 to 2²⁴; where there is a target or a budget, the most that a pixel may get.
     pub samples: u32,
+    /// Relative error that the picture may have ([`PictureError::at_most`]), above 0: samples go where it is noisy until that is met.
+    pub target_error: Option<f64>,
+    /// Time for the picture: the best within that, or within the time it takes to meet the target.
+    pub time_budget: Option<Duration>,
     /// Key of all random numbers.
     pub seed: u64,
     /// How lights are found.
     pub strategy: Strategy,
     /// Layers to gather beside the radiance; none by default, which takes no time.
     pub layers: LayerSet,
+    /// What to compute; by default what the scene calls for.
+    pub plan: Option<Plan>,
 }
 
 impl Default for Options {
     fn default() -> Self {
         let (strategy, layers) = (Strategy::default(), LayerSet::default());
-        Self { width: 512, height: 512, samples: 64, seed: 0, strategy, layers }
+        let (target_error, time_budget) = (None, None);
+        Self { width: 512, height: 512, samples: 64, target_error, time_budget, seed: 0, strategy, layers, plan: None }
     }
 }
 
@@ -53,6 +64,14 @@ impl Options {
     pub fn of(spec: &SceneSpec) -> Self {
         let [width, height] = spec.film.resolution;
         Self { width, height, samples: spec.film.samples, ..Self::default() }
+    }
+
+    /// What is computed for a scene.
+    fn plan_for(&self, scene: &Scene) -> Plan {
+        let plan = self.plan.unwrap_or_else(|| Plan::of(scene));
+        // Packets know one way to find lights, and gather no layers.
+        let packets = plan.packets && self.strategy == Strategy::Combined && self.layers.is_empty();
+        Plan { packets, closed_forms: plan.closed_forms && packets, ..plan }
     }
 
     /// Checks every field.
@@ -66,6 +85,10 @@ impl Options {
                 let (origin, field, value) = ("render options".into(), field.into(), value.to_string());
                 return Err(RenderError::Field { origin, field, value, constraint: format!("from 1 to {most}") });
             }
+        }
+        if let Some(target) = self.target_error.filter(|t| !(*t > 0.0 && t.is_finite())) {
+            let (origin, field, value) = ("render options".into(), "target_error".into(), target.to_string());
+            return Err(RenderError::Field { origin, field, value, constraint: "above 0 and finite".into() });
         }
         if u64::from(self.width) * u64::from(self.height) > MAX_PIXELS {
             let value = format!("{} × {}", self.width, self.height);
@@ -91,6 +114,8 @@ pub struct Film {
     scene: String,
     plan: String,
     seed: u64,
+    tiles: Tiles,
+    /// Tile after tile.
     pixels: Vec<Pixel>,
     layers: LayerSet,
     /// One for each pixel where there are layers, else none.
@@ -101,25 +126,41 @@ impl Film {
     /// Mean radiance of the pixel in column x and row y, W/(sr·m²); `None` outside of the picture.
     #[must_use]
     pub fn radiance(&self, x: u32, y: u32) -> Option<DVec3> {
-        Some(self.pixel(x, y)?.mean())
+        Some(self.pixels[self.slot(x, y)?].mean())
     }
 
     /// Standard error of [`Film::radiance`]; infinite below two samples.
     #[must_use]
     pub fn standard_error(&self, x: u32, y: u32) -> Option<DVec3> {
-        Some(self.pixel(x, y)?.standard_error())
+        let slot = self.slot(x, y)?;
+        let index = slot / TILE_ROOM;
+        Some(standard_errors(self.tiles.tile(index), self.tile_pixels(index))[slot % TILE_ROOM])
+    }
+
+    /// Standard deviation of one sample of the pixel; infinite below two samples. Samples of one pixel are more even than independent
+    /// ones, so [`Film::standard_error`] is usually less than this over the root of their number.
+    #[must_use]
+    pub fn sample_deviation(&self, x: u32, y: u32) -> Option<DVec3> {
+        let pixel = &self.pixels[self.slot(x, y)?];
+        Some((pixel.scatter() * f64::from(pixel.samples)).map(f64::sqrt))
     }
 
     /// Number of samples of the pixel with the fewest: fewer than asked for where the work was stopped.
     #[must_use]
     pub fn samples(&self) -> u32 {
-        self.pixels.iter().map(|p| p.samples).min().unwrap_or(0)
+        self.tiles.slots().map(|slot| self.pixels[slot].samples).min().unwrap_or(0)
     }
 
     /// Number of all samples taken.
     #[must_use]
     pub fn total_samples(&self) -> u64 {
-        self.pixels.iter().map(|p| u64::from(p.samples)).sum()
+        self.tiles.slots().map(|slot| u64::from(self.pixels[slot].samples)).sum()
+    }
+
+    /// How far off the picture is, as far as its noise says; `None` where a pixel has fewer than two samples.
+    #[must_use]
+    pub fn error(&self) -> Option<PictureError> {
+        (self.samples() >= 2).then(|| Noise::all(&self.noise()).error())
     }
 
     /// The picture with its layers. `mask` is the mean over the pixel's paths of the largest weight at which each asked for a value
@@ -130,157 +171,230 @@ impl Film {
     #[must_use]
     pub fn to_image(&self) -> Image {
         let share = |p: &Pixel| if p.samples == 0 { 1.0 } else { p.unknown / f64::from(p.samples) };
+        let errors = |i: usize| standard_errors(self.tiles.tile(i), self.tile_pixels(i));
+        let errors: Vec<DVec3> = (0..self.tiles.count()).into_par_iter().flat_map_iter(errors).collect();
+        let slots = || self.tiles.slots();
+        let gathered: Vec<Gathered> = match self.gathered.is_empty() {
+            true => Vec::new(),
+            false => slots().map(|slot| self.gathered[slot]).collect(),
+        };
         Image {
             width: self.width as usize,
             height: self.height as usize,
-            radiance: self.pixels.iter().map(|p| p.mean().to_array()).collect(),
-            standard_error: Some(self.pixels.iter().map(|p| p.standard_error().to_array()).collect()),
-            mask: Some(self.pixels.iter().map(share).collect()),
+            radiance: slots().map(|slot| self.pixels[slot].mean().to_array()).collect(),
+            standard_error: Some(slots().map(|slot| errors[slot].to_array()).collect()),
+            mask: Some(slots().map(|slot| share(&self.pixels[slot])).collect()),
             metadata: Metadata {
                 scene: Some(self.scene.clone()),
                 seed: Some(self.seed),
                 samples: Some(self.samples()),
+                mean_samples: Some(self.total_samples() as f64 / (f64::from(self.width) * f64::from(self.height))),
                 seconds: Some(self.seconds),
+                relative_error: self.error().map(|e| [e.relative, e.at_most]),
                 program: Some(format!("goniofit {}", env!("CARGO_PKG_VERSION"))),
                 plan: Some(self.plan.clone()),
             },
-            layers: self.layers.kinds().filter_map(|kind| layer(kind, &self.gathered)).collect(),
+            layers: self.layers.kinds().filter_map(|kind| layer(kind, &gathered)).collect(),
         }
     }
 
-    fn pixel(&self, x: u32, y: u32) -> Option<&Pixel> {
-        (x < self.width).then(|| self.pixels.get(y as usize * self.width as usize + x as usize))?
+    fn slot(&self, x: u32, y: u32) -> Option<usize> {
+        (x < self.width && y < self.height).then(|| self.tiles.slot(x as usize, y as usize))
+    }
+
+    fn tile_pixels(&self, index: usize) -> &[Pixel] {
+        &self.pixels[index * TILE_ROOM..][..TILE_ROOM]
+    }
+
+    /// Mean radiance of the picture.
+    fn mean(&self) -> f64 {
+        let part = |i: usize| -> f64 {
+            let pixels = self.tile_pixels(i);
+            self.tiles.tile(i).slots().map(|slot| pixels[slot].mean().element_sum()).sum()
+        };
+        let parts: Vec<f64> = (0..self.tiles.count()).into_par_iter().map(part).collect();
+        parts.iter().sum::<f64>() / (3 * self.width as usize * self.height as usize) as f64
+    }
+
+    /// How far off its tiles are.
+    fn noise(&self) -> Vec<Noise> {
+        let mean = self.mean();
+        let noise = |i: usize| Noise::of(self.tiles.tile(i), self.tile_pixels(i), mean);
+        (0..self.tiles.count()).into_par_iter().map(noise).collect()
     }
 }
 
 /// Renders a scene on the current thread pool.
 ///
-/// The picture is rendered in passes of a growing number of samples per pixel. When the work is stopped, every pixel keeps what
-/// it has, so a stop after the first pass leaves a whole picture with fewer samples. The bits of the result depend on nothing
-/// but the scene, the options and, when stopped, on the number of samples that each pixel got.
+/// The picture is rendered in rounds of a growing number of samples per pixel. When the work is stopped, every pixel keeps what
+/// it has, so a stop after the first round leaves a whole picture with fewer samples. The bits of the result depend on nothing
+/// but the scene, the options and, when stopped or out of time, on the number of samples that each pixel got.
 ///
 /// # Errors
 /// [`RenderError::Field`] where an option is out of range, [`RenderError::Memory`] where the picture does not fit.
 pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<Film, RenderError> {
     options.validate()?;
+    let plan = options.plan_for(scene);
     let start = Instant::now();
-    let width = options.width as usize;
-    let count = u64::from(options.width) * u64::from(options.height);
-    let mut pixels = reserved(options, count as usize)?;
-    let mut gathered = Vec::new();
-    if !options.layers.is_empty() {
-        gathered = reserved(options, count as usize)?;
-        gathered.resize(count as usize, Gathered::default());
-    }
-    (0..count as usize).into_par_iter().map(|i| Pixel::new(options.seed, i as u64)).collect_into_vec(&mut pixels);
+    let tiles = Tiles { width: options.width as usize, height: options.height as usize };
+    let room = tiles.count() * TILE_ROOM;
     let mut film = Film {
         width: options.width,
         height: options.height,
         seconds: 0.0,
         not_finite: 0,
         scene: scene.name.clone(),
-        plan: plan(scene, options),
+        plan: in_words(scene, &plan, options),
         seed: options.seed,
-        pixels,
+        tiles,
+        pixels: filled(options, room)?,
         layers: options.layers,
-        gathered,
+        gathered: if options.layers.is_empty() { Vec::new() } else { filled(options, room)? },
     };
-    let camera = Camera::new(&scene.camera, scene.origin, options.width, options.height);
-    let tracer = Tracer::new(scene, options.strategy);
-    let flat = FlatScene::of(scene).filter(|_| options.strategy == Strategy::Combined);
-    let packets = flat.as_ref().map(|scene| Packets { scene, plan: Plan::of(scene), camera, seed: options.seed });
-    control.progress.start("render", u64::from(options.samples) * u64::from(options.height));
-    let mut done = 0;
-    while done < options.samples && !control.stop.requested() {
-        let least = if packets.is_some() { LANES as u32 } else { 1 };
-        let pass = done.clamp(least, PASS).min(options.samples - done);
-        let mut gathered: Vec<_> = film.gathered.chunks_mut(width).map(Some).collect();
-        gathered.resize_with(options.height as usize, || None);
-        let rows = film.pixels.par_chunks_mut(width).zip(gathered).enumerate();
-        let bad = rows.map(|(y, (row, gathered))| {
-            if control.stop.requested() {
-                return 0;
+    let camera = Camera::new(&scene.camera, scene.origin, scene.filter, options.width, options.height);
+    let flat = FlatScene::of(scene).filter(|_| plan.packets);
+    let packets = flat.as_ref().map(|scene| Packets::new(scene, plan, camera, options.seed));
+    let tracer = Tracer::new(scene, options.strategy, plan);
+    let painter = Painter { tracer, camera, seed: options.seed, packets };
+    let mut schedule = Schedule::new(options, tiles.count(), start);
+    if !schedule.adapts() {
+        control.progress.start("render", u64::from(options.samples) * tiles.count() as u64);
+    }
+    let mut more = Some(schedule.first(if painter.packets.is_some() { LANES as u32 } else { 1 }));
+    let mut state = String::new();
+    while let Some(round) = more.take() {
+        if schedule.adapts() {
+            control.progress.start("render, next round", round.iter().map(|n| u64::from(*n)).sum());
+            control.progress.tell(&state);
+        }
+        film.not_finite += paint(&painter, &mut film, &schedule, &round, control);
+        schedule.advance(&round);
+        let over = control.stop.requested() || schedule.deadline().is_some_and(|end| Instant::now() >= end);
+        if !over {
+            let noise = if schedule.adapts() { film.noise() } else { Vec::new() };
+            if schedule.adapts() {
+                state = format!("error {:.2} %", 100.0 * Noise::all(&noise).error().relative);
             }
-            let bad = match (gathered, &packets) {
-                (None, Some(packets)) => packet_row(packets, y, row, (done, pass)),
-                (None, None) => render_row(&tracer, &camera, y, row, pass, |_, (): &(), _| {}),
-                (Some(g), _) => {
-                    render_row(&tracer, &camera, y, row, pass, |x, sight: &Sight, path| g[x].add(sight, path.radiance))
-                }
-            };
-            control.progress.advance(u64::from(pass));
-            bad
-        });
-        film.not_finite += bad.sum::<u64>();
-        done += pass;
+            more = schedule.next(&noise);
+        }
     }
     control.progress.finish();
     film.seconds = start.elapsed().as_secs_f64();
     Ok(film)
 }
 
-/// Room for `count` pixels: a picture that does not fit into memory is an error, not the end of the program.
-fn reserved<T>(options: &Options, count: usize) -> Result<Vec<T>, RenderError> {
-    let mut pixels = Vec::new();
+/// Room for `count` values: a picture that does not fit into memory is an error, not the end of the program.
+fn filled<T: Clone + Default>(options: &Options, count: usize) -> Result<Vec<T>, RenderError> {
+    let mut values = Vec::new();
     let refused = |_| {
         let bytes = count as f64 * size_of::<T>() as f64;
         RenderError::Memory { width: options.width, height: options.height, gigabytes: bytes * 1e-9 }
     };
-    pixels.try_reserve_exact(count).map_err(refused)?;
-    Ok(pixels)
+    values.try_reserve_exact(count).map_err(refused)?;
+    values.resize(count, T::default());
+    Ok(values)
 }
 
 /// In one line, what is computed.
-fn plan(scene: &Scene, options: &Options) -> String {
+fn in_words(scene: &Scene, plan: &Plan, options: &Options) -> String {
     let lights = match options.strategy {
         Strategy::Combined => "lights sampled by position and by material",
         Strategy::MaterialOnly => "lights sampled by material",
         Strategy::LightsOnly => "lights sampled by position",
     };
     let layers = if options.layers.is_empty() { "none".into() } else { options.layers.names() };
-    format!("paths of at most {} scattering events, {lights}; further layers: {layers}", scene.max_bounces)
+    let effects = plan.effects(scene).effects;
+    let names = |on: bool| effects.iter().filter(|e| e.on == on).map(|e| e.name).collect::<Vec<_>>().join(", ");
+    let events = plan.events(scene.max_bounces);
+    format!(
+        "paths of at most {events} scattering events, {lights}; on: {}; off: {}; further layers: {layers}",
+        names(true),
+        names(false)
+    )
 }
 
-/// Adds `samples` paths to every pixel of a row, and tells `gather` of each, with its column and what was watched; the number of
-/// those that were not finite.
-fn render_row<W: Watch + Default>(
-    tracer: &Tracer<'_>,
-    camera: &Camera,
-    y: usize,
-    row: &mut [Pixel],
-    samples: u32,
-    mut gather: impl FnMut(usize, &W, &PathResult),
-) -> u64 {
-    let mut bad = 0;
-    for (x, pixel) in row.iter_mut().enumerate() {
-        for _ in 0..samples {
-            let jitter = DVec2::new(pixel.rng.random(), pixel.rng.random());
-            let ray = camera.ray(DVec2::new(x as f64, y as f64) + jitter);
-            let mut watch = W::default();
-            let path = tracer.trace(ray, &mut pixel.rng, &mut watch);
-            debug_assert!(path.radiance.is_finite(), "pixel ({x}, {y}): radiance {}", path.radiance);
-            bad += u64::from(!path.radiance.is_finite());
-            pixel.add(&path);
-            gather(x, &watch, &path);
+/// Adds so many samples to the pixels of every tile; the number of those that were not finite.
+fn paint(painter: &Painter<'_>, film: &mut Film, schedule: &Schedule, round: &[u32], control: Control<'_>) -> u64 {
+    let tiles = film.tiles;
+    let mut gathered: Vec<_> = film.gathered.chunks_mut(TILE_ROOM).map(Some).collect();
+    gathered.resize_with(tiles.count(), || None);
+    let deadline = schedule.deadline();
+    let over = || control.stop.requested() || deadline.is_some_and(|end| Instant::now() >= end);
+    let work = film.pixels.par_chunks_mut(TILE_ROOM).zip(gathered).enumerate();
+    let bad = work.map(|(i, (pixels, mut gathered))| {
+        let (mut done, end) = (schedule.have()[i], schedule.have()[i] + round[i]);
+        let mut bad = 0;
+        while done < end && !over() {
+            let pass = PASS.min(end - done);
+            bad += painter.paint(tiles.tile(i), pixels, gathered.as_deref_mut(), (done, pass));
+            done += pass;
+            control.progress.advance(u64::from(pass));
+        }
+        bad
+    });
+    bad.sum()
+}
+
+/// Follows paths through the pixels of a tile.
+struct Painter<'a> {
+    tracer: Tracer<'a>,
+    camera: Camera,
+    seed: u64,
+    packets: Option<Packets<'a>>,
+}
+
+impl Painter<'_> {
+    /// Adds `samples` paths to every pixel of a tile whose pixels have `done`; the number of those that were not finite.
+    fn paint(&self, tile: Tile, pixels: &mut [Pixel], gathered: Option<&mut [Gathered]>, of: (u32, u32)) -> u64 {
+        match (gathered, &self.packets) {
+            (None, Some(packets)) => by_packets(packets, tile, pixels, of),
+            (None, None) => self.one_by_one(tile, pixels, of, |_, (): &(), _| {}),
+            (Some(gathered), _) => self.one_by_one(tile, pixels, of, |slot, sight: &Sight, path| {
+                gathered[slot].add(sight, path.radiance);
+            }),
         }
     }
-    bad
+
+    /// The same, one path at a time, telling `gather` of each, with its pixel's place and what was watched.
+    fn one_by_one<W: Watch + Default>(
+        &self,
+        tile: Tile,
+        pixels: &mut [Pixel],
+        (done, samples): (u32, u32),
+        mut gather: impl FnMut(usize, &W, &PathResult),
+    ) -> u64 {
+        let mut bad = 0;
+        for slot in tile.slots() {
+            let (x, y) = (tile.x + slot % TILE, tile.y + slot / TILE);
+            let key = key_of(self.seed, x as u32, y as u32);
+            for sample in done..done + samples {
+                let draws = Draws::new(key, sample);
+                let ray = self.camera.ray(x, y, draws);
+                let mut watch = W::default();
+                let path = self.tracer.trace(ray, draws, &mut watch);
+                debug_assert!(path.radiance.is_finite(), "pixel ({x}, {y}): radiance {}", path.radiance);
+                bad += u64::from(!path.radiance.is_finite());
+                pixels[slot].add(&path);
+                gather(slot, &watch, &path);
+            }
+        }
+        bad
+    }
 }
 
-/// The same by packets: those of the last that are too many don't count.
-fn packet_row(packets: &Packets<'_>, y: usize, row: &mut [Pixel], (done, samples): (u32, u32)) -> u64 {
+/// The same by packets: paths of the last that are too many don't count.
+fn by_packets(packets: &Packets<'_>, tile: Tile, pixels: &mut [Pixel], (done, samples): (u32, u32)) -> u64 {
     let mut bad = 0;
-    let width = row.len();
-    let mut take = |x: usize, packet: u32, found: &Found| {
+    let mut take = |slot: usize, packet: u32, found: &Found| {
         let left = (samples as usize - packet as usize * LANES).min(LANES);
         for ((r, g), b) in found[0].iter().zip(&found[1]).zip(&found[2]).take(left) {
             let radiance = DVec3::new(*r, *g, *b);
-            debug_assert!(radiance.is_finite(), "pixel ({x}, {y}): radiance {radiance}");
+            debug_assert!(radiance.is_finite(), "tile at ({}, {}), {slot}: radiance {radiance}", tile.x, tile.y);
             bad += u64::from(!radiance.is_finite());
-            row[x].add(&PathResult { radiance, unknown: 0.0 });
+            pixels[slot].add(&PathResult { radiance, unknown: 0.0 });
         }
     };
-    packets.row(y, width, done, samples.div_ceil(LANES as u32), &mut take);
+    packets.tile(tile, done, samples.div_ceil(LANES as u32), &mut take);
     bad
 }
 
@@ -303,7 +417,7 @@ mod tests {
 
     #[test]
     fn memory_that_is_not_there_is_an_error() {
-        let error = reserved::<Pixel>(&Options::default(), usize::MAX / 2).expect_err("more than there is");
+        let error = filled::<Pixel>(&Options::default(), usize::MAX / 2).expect_err("more than there is");
         assert!(matches!(error, RenderError::Memory { width: 512, height: 512, .. }), "{error}");
     }
 }

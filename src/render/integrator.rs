@@ -3,12 +3,13 @@
 use glam::{DVec2, DVec3};
 
 use super::material::{Material, PhongEquation, eval_rgb};
+use super::plan::Plan;
+use super::points::{Decision, Draws};
 use super::ray::{Ray, SurfacePoint};
 use super::scene::Scene;
 use super::shapes::{Owner, Surface};
 use crate::brdf::Brdf;
 use crate::geometry::Frame;
-use crate::numeric::random::{RngExt, Stream};
 
 /// Scattering events before paths may end by chance.
 pub(super) const ROULETTE_AFTER: u32 = 5;
@@ -53,14 +54,15 @@ pub struct PathResult {
 
 /// What somebody may want to know of a path beside its radiance. `()` wants nothing, and costs nothing.
 pub trait Watch {
-    /// The first surface that the path meets, seen from `eye`, and its material, if it is no light. `rng` is the path's stream.
-    fn first_surface(&mut self, eye: DVec3, surface: &Surface, material: Option<&Material>, rng: &Stream);
+    /// The first surface that the path meets, seen from `eye`, and its material, if it is no light. `draws` are the path's,
+    /// about to choose a direction there.
+    fn first_surface(&mut self, eye: DVec3, surface: &Surface, material: Option<&Material>, draws: Draws);
     /// From here on light has scattered twice or more; `so_far` is the radiance of the light that has not.
     fn indirect_begins(&mut self, so_far: DVec3);
 }
 
 impl Watch for () {
-    fn first_surface(&mut self, _: DVec3, _: &Surface, _: Option<&Material>, _: &Stream) {}
+    fn first_surface(&mut self, _: DVec3, _: &Surface, _: Option<&Material>, _: Draws) {}
     fn indirect_begins(&mut self, _: DVec3) {}
 }
 
@@ -84,8 +86,9 @@ struct Vertex {
 pub struct Tracer<'a> {
     scene: &'a Scene,
     strategy: Strategy,
-    /// Whether a ray can find light at all; where not, the last scattering event needs no ray.
-    rays_find_light: bool,
+    plan: Plan,
+    /// Scattering events of a path at most.
+    events: u32,
 }
 
 struct Path {
@@ -102,23 +105,29 @@ impl Path {
 }
 
 impl<'a> Tracer<'a> {
-    /// A tracer for a scene.
-    pub fn new(scene: &'a Scene, strategy: Strategy) -> Self {
-        let rays_find_light = scene.rays_find_light() && strategy != Strategy::LightsOnly;
-        Self { scene, strategy, rays_find_light }
+    /// A tracer for a scene, by a plan.
+    pub fn new(scene: &'a Scene, strategy: Strategy, plan: Plan) -> Self {
+        // Closed forms are the packets'; where there is none, light must be found.
+        let chance = scene.rays_find_light() && strategy != Strategy::LightsOnly;
+        Self { scene, strategy, plan: Plan { chance, ..plan }, events: plan.events(scene.max_bounces) }
     }
 
     /// Follows one path that starts with `ray` at the camera.
-    pub fn trace(&self, mut ray: Ray, rng: &mut Stream, watch: &mut impl Watch) -> PathResult {
+    pub fn trace(&self, mut ray: Ray, draws: Draws, watch: &mut impl Watch) -> PathResult {
         let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: 0.0 };
         let mut last: Option<Scatter> = None;
-        for bounce in 0..=self.scene.max_bounces {
+        for bounce in 0..=self.events {
             let Some(surface) = self.scene.geometry.closest(&ray) else {
                 path.radiance += path.throughput * self.environment_found(&ray, last.as_ref());
                 break;
             };
             if bounce == 0 {
-                watch.first_surface(ray.origin, &surface, self.material_of(&surface), rng);
+                watch.first_surface(
+                    ray.origin,
+                    &surface,
+                    self.material_of(&surface),
+                    self.draws_at(draws, 0, Decision::Direction),
+                );
             }
             if surface.point.normal.dot(ray.direction) >= 0.0 {
                 break; // the back of anything is black
@@ -131,7 +140,7 @@ impl<'a> Tracer<'a> {
                 }
                 Owner::Material(material) => &self.scene.materials[material],
             };
-            if bounce == self.scene.max_bounces {
+            if bounce == self.events {
                 break;
             }
             let vertex = Vertex::new(&surface, -ray.direction);
@@ -142,11 +151,21 @@ impl<'a> Tracer<'a> {
                 // What the lights send to the second surface will have scattered there and at the first.
                 watch.indirect_begins(path.radiance);
             }
-            let Some(next) = self.scatter(material, &vertex, bounce, &mut path, rng) else { break };
+            let Some(next) = self.scatter(material, &vertex, bounce, &mut path, draws) else { break };
             ray = Ray::new(vertex.point.above(), next.0);
             last = Some(next.1);
         }
         PathResult { radiance: path.radiance, unknown: path.unknown }
+    }
+
+    /// The numbers of a decision.
+    fn draws_at(&self, draws: Draws, bounce: u32, decision: Decision) -> Draws {
+        draws.at(decision.number(bounce, self.scene.lights.len()))
+    }
+
+    /// Whether something lies on a segment towards a light.
+    fn hides(&self, segment: &Ray) -> bool {
+        self.plan.shadows && self.scene.geometry.occluded(segment)
     }
 
     fn material_of(&self, surface: &Surface) -> Option<&'a Material> {
@@ -163,7 +182,7 @@ impl<'a> Tracer<'a> {
         vertex: &Vertex,
         bounce: u32,
         path: &mut Path,
-        rng: &mut Stream,
+        draws: Draws,
     ) -> Option<(DVec3, Scatter)> {
         let brdf = match material {
             Material::Black => return None,
@@ -173,11 +192,11 @@ impl<'a> Tracer<'a> {
             }
             Material::Brdf(brdf) => brdf.as_ref(),
         };
-        self.add_direct(brdf, vertex, path, rng);
-        if bounce + 1 == self.scene.max_bounces && !self.rays_find_light {
+        self.add_direct(brdf, vertex, bounce, path, draws);
+        if bounce + 1 == self.events && !self.plan.chance {
             return None;
         }
-        let drawn = brdf.sample(vertex.wo, [rng.random(), rng.random(), rng.random()])?;
+        let drawn = brdf.sample(vertex.wo, self.draws_at(draws, bounce, Decision::Direction).direction())?;
         let (f, known) = eval_rgb(brdf, drawn.wi, vertex.wo);
         if !known {
             path.meet_unknown();
@@ -185,19 +204,22 @@ impl<'a> Tracer<'a> {
         path.throughput *= f * (drawn.wi.z / drawn.pdf);
         let direction = vertex.frame.to_world(drawn.wi).normalize();
         let above = vertex.point.normal.dot(direction) > 0.0;
-        let goes_on = above && path.throughput != DVec3::ZERO && survives(bounce, path, rng);
+        let goes_on = above
+            && path.throughput != DVec3::ZERO
+            && survives(bounce, path, || self.draws_at(draws, bounce, Decision::Roulette).single());
         let scatter = Scatter { position: vertex.point.position, normal: vertex.frame.normal, pdf: drawn.pdf };
         goes_on.then_some((direction, scatter))
     }
 
     /// Light found by aiming at the lights.
-    fn add_direct(&self, brdf: &dyn Brdf, vertex: &Vertex, path: &mut Path, rng: &mut Stream) {
-        for light in &self.scene.lights {
+    fn add_direct(&self, brdf: &dyn Brdf, vertex: &Vertex, bounce: u32, path: &mut Path, draws: Draws) {
+        for (k, light) in self.scene.lights.iter().enumerate() {
             let by_chance = light.has_surface();
             if by_chance && self.strategy == Strategy::MaterialOnly {
                 continue;
             }
-            let u = if by_chance { DVec2::new(rng.random(), rng.random()) } else { DVec2::ZERO };
+            let draw = || self.draws_at(draws, bounce, Decision::Light(k as u32)).pair();
+            let u = if by_chance { draw() } else { DVec2::ZERO };
             let Some(arrival) = light.sample(&vertex.point, u) else { continue };
             let reflected = self.reflected(brdf, vertex, arrival.wi, arrival.pdf);
             self.add_unhidden(reflected, &arrival.shadow, arrival.irradiance, path);
@@ -205,7 +227,8 @@ impl<'a> Tracer<'a> {
         if let Some(environment) = &self.scene.environment
             && self.strategy != Strategy::MaterialOnly
         {
-            let sky = environment.sample(&vertex.frame, DVec2::new(rng.random(), rng.random()));
+            let u = self.draws_at(draws, bounce, Decision::Environment).pair();
+            let sky = environment.sample(&vertex.frame, u);
             let irradiance = sky.radiance / sky.pdf;
             if irradiance.is_finite() {
                 let reflected = self.reflected(brdf, vertex, sky.wi, Some(sky.pdf));
@@ -217,7 +240,7 @@ impl<'a> Tracer<'a> {
     /// Adds what is reflected of the irradiance that arrives along `shadow`, where nothing is in its way.
     fn add_unhidden(&self, reflected: Option<DVec3>, shadow: &Ray, irradiance: DVec3, path: &mut Path) {
         let matters = irradiance != DVec3::ZERO && reflected != Some(DVec3::ZERO);
-        if !matters || self.scene.geometry.occluded(shadow) {
+        if !matters || self.hides(shadow) {
             return;
         }
         match reflected {
@@ -269,7 +292,7 @@ impl<'a> Tracer<'a> {
             let Some(segment) = light.as_seen_by_equation(&vertex.point) else { continue };
             let term = equation.light_term(vertex.frame.to_local(segment.direction), vertex.wo);
             let above = vertex.point.normal.dot(segment.direction) > 0.0;
-            if above && term != DVec3::ZERO && !self.scene.geometry.occluded(&segment) {
+            if above && term != DVec3::ZERO && !self.hides(&segment) {
                 radiance += term;
             }
         }
@@ -286,7 +309,7 @@ impl Vertex {
 
 /// Russian roulette: a path whose throughput has fallen to q < 1 goes on with probability q and counts for 1/q. Its largest
 /// channel is then 1, so roulette never raises a path above what it started with.
-fn survives(bounce: u32, path: &mut Path, rng: &mut Stream) -> bool {
+fn survives(bounce: u32, path: &mut Path, draw: impl FnOnce() -> f64) -> bool {
     if bounce < ROULETTE_AFTER {
         return true;
     }
@@ -295,5 +318,5 @@ fn survives(bounce: u32, path: &mut Path, rng: &mut Stream) -> bool {
         return true;
     }
     path.throughput /= q;
-    rng.random::<f64>() < q
+    draw() < q
 }

@@ -5,10 +5,10 @@ use glam::DVec3;
 
 use super::integrator::Watch;
 use super::material::{Material, eval_rgb};
+use super::points::Draws;
 use super::shapes::Surface;
 use crate::geometry::Frame;
 use crate::image::{Layer, LayerKind};
-use crate::numeric::random::{RngExt, Stream};
 
 /// Which layers a render gathers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -122,10 +122,10 @@ struct First {
 }
 
 impl Watch for Sight {
-    fn first_surface(&mut self, eye: DVec3, surface: &Surface, material: Option<&Material>, rng: &Stream) {
+    fn first_surface(&mut self, eye: DVec3, surface: &Surface, material: Option<&Material>, draws: Draws) {
         let to = surface.point.position - eye;
         let depth = to.length();
-        let albedo = material.map_or(DVec3::ZERO, |m| albedo(m, surface, -to / depth, rng.clone()));
+        let albedo = material.map_or(DVec3::ZERO, |m| albedo(m, surface, -to / depth, draws));
         self.first = Some(First { albedo, normal: surface.shading_normal, depth });
     }
 
@@ -135,14 +135,14 @@ impl Watch for Sight {
 }
 
 /// One estimate of the directional albedo ∫ f cosθ dω: f·cosθ/pdf of a direction that the material draws. The numbers are those
-/// that the path goes on with, from a copy of its stream, so the path itself does not change.
-fn albedo(material: &Material, surface: &Surface, to_eye: DVec3, mut rng: Stream) -> DVec3 {
+/// that the path goes on with, so the path itself does not change.
+fn albedo(material: &Material, surface: &Surface, to_eye: DVec3, draws: Draws) -> DVec3 {
     let Material::Brdf(brdf) = material else { return DVec3::ZERO };
     let wo = Frame::from_normal(surface.shading_normal).to_local(to_eye);
     if wo.z <= 0.0 || surface.point.normal.dot(to_eye) <= 0.0 {
         return DVec3::ZERO;
     }
-    let drawn = brdf.sample(wo, [rng.random(), rng.random(), rng.random()]);
+    let drawn = brdf.sample(wo, draws.direction());
     drawn.map_or(DVec3::ZERO, |drawn| eval_rgb(brdf.as_ref(), drawn.wi, wo).0 * (drawn.wi.z / drawn.pdf))
 }
 

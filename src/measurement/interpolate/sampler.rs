@@ -83,10 +83,10 @@ impl Sampler {
             return None;
         }
         let plane = Plane::new(wo);
-        let wi = match self.choose(wo, u[2]) {
-            None => cosine_hemisphere(DVec2::new(u[0], u[1])),
+        let wi = match self.choose(wo, u[0]) {
+            None => cosine_hemisphere(DVec2::new(u[1], u[2])),
             Some((c, distribution)) => {
-                let at = distribution.draw(&self.borders[c], u[0], u[1]);
+                let at = distribution.draw(&self.borders[c], u[1], u[2]);
                 plane.leave(Chart::BOTH[c].light(&plane, at)?.0)
             }
         };

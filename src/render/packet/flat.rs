@@ -6,6 +6,8 @@ use super::super::lights::{Environment, Light, QuadLight};
 use super::super::material::Material;
 use super::super::scene::Scene;
 use super::super::shapes::{Owner, Sphere};
+use super::closed::Surround;
+use super::occluders::{Extent, Occluders};
 
 /// Shapes and materials that a scene may have: every ray asks all of them.
 const MOST_SHAPES: usize = 48;
@@ -46,9 +48,15 @@ pub(in crate::render) struct FlatScene<'a> {
     pub(super) materials: Vec<Lobes>,
     pub(super) lights: &'a [Light],
     pub(super) environment: Option<DVec3>,
+    /// What may hide each light from a surface.
+    pub(super) before_lights: Vec<Occluders>,
+    /// What may hide the environment.
+    pub(super) before_environment: Occluders,
     pub(super) max_bounces: u32,
-    /// Whether a ray can find light at all.
-    pub(super) rays_find_light: bool,
+    /// Which lights nothing can hide, so that what they shine on a diffuse surface has a closed form.
+    pub(super) closed: Vec<bool>,
+    /// How many of the shapes reflect.
+    surfaces: usize,
     /// Phong lobes of the material that has most.
     pub(super) lobes: usize,
 }
@@ -70,7 +78,15 @@ impl<'a> FlatScene<'a> {
         if spheres.len() + planes.len() + quads.len() > MOST_SHAPES || materials.len() > MOST_MATERIALS {
             return None;
         }
-        let spheres = spheres.iter().map(|(sphere, owner)| (*sphere, number(*owner))).collect();
+        let reflects = |owner: &Owner| match owner {
+            Owner::Material(i) => !materials[*i].black,
+            Owner::Light { .. } => false,
+        };
+        let balls = spheres.iter().filter(|s| reflects(&s.1)).map(|s| Extent::Ball(s.0));
+        let endless = planes.iter().filter(|p| reflects(&p.1)).map(|p| Extent::Endless(p.0));
+        let corners = quads.iter().filter(|q| reflects(&q.1)).map(|q| Extent::of_quad(&q.0));
+        let surfaces: Vec<Extent> = balls.chain(endless).chain(corners).collect();
+        let spheres: Vec<_> = spheres.iter().map(|(sphere, owner)| (*sphere, number(*owner))).collect();
         let planes = planes.iter().map(|(plane, owner)| {
             let reach = plane.point.abs().max_element();
             (Piece { point: plane.point, normal: plane.normal, to_a: DVec3::ZERO, to_b: DVec3::ZERO, reach }, *owner)
@@ -80,9 +96,19 @@ impl<'a> FlatScene<'a> {
             let reach = (quad.center.abs() + quad.u.abs() + quad.v.abs()).max_element();
             (Piece { point: quad.center, normal: quad.normal, to_a, to_b, reach }, *owner)
         });
-        let pieces = planes.chain(quads).map(|(piece, owner)| (piece, number(owner))).collect();
+        let pieces: Vec<_> = planes.chain(quads).map(|(piece, owner)| (piece, number(owner))).collect();
         let most = materials.iter().map(|m| m.phong.len()).max().unwrap_or(0);
+        let all = Occluders {
+            spheres: spheres.iter().map(|s| s.0).collect(),
+            pieces: pieces.iter().map(|p: &(Piece, OwnerNumber)| p.0).collect(),
+        };
+        let alone = spheres.len() + pieces.len() <= 1;
+        let before_lights: Vec<_> = scene.lights.iter().map(|light| Occluders::of(light, &all, &surfaces)).collect();
+        let free = |(light, before): (&Light, &Occluders)| matches!(light, Light::Quad(_)) && before.is_empty();
+        let closed = scene.lights.iter().zip(&before_lights).map(free).collect();
         Some(Self {
+            before_lights,
+            before_environment: if alone { Occluders::default() } else { all },
             spheres,
             pieces,
             lobes: most,
@@ -90,19 +116,49 @@ impl<'a> FlatScene<'a> {
             lights: &scene.lights,
             environment,
             max_bounces: scene.max_bounces,
-            rays_find_light: scene.rays_find_light(),
+            closed,
+            surfaces: surfaces.len(),
         })
     }
 
-    /// Whether a ray from a surface can meet any: with one convex piece that reflects, and no other, none can.
-    pub fn sees_itself(&self) -> bool {
-        self.spheres.len() + self.pieces.len() > 1
+    /// Whether more than one shape reflects. All are convex, so that one alone sees nothing of itself.
+    pub fn may_interreflect(&self) -> bool {
+        self.surfaces > 1
     }
 
-    /// The lights that have a surface, with their owner's number.
-    pub(super) fn shining(&self) -> impl Iterator<Item = (OwnerNumber, &'a QuadLight)> {
+    /// Whether anything may stand between a surface and a light or the environment.
+    pub fn casts_shadows(&self) -> bool {
+        let hides = |occluders: &Occluders| !occluders.is_empty();
+        self.before_lights.iter().any(hides) || self.environment.is_some() && hides(&self.before_environment)
+    }
+
+    /// Number of lights whose light on diffuse surfaces has a closed form.
+    pub fn closed_lights(&self) -> usize {
+        self.closed.iter().filter(|closed| **closed).count()
+    }
+
+    /// Whether what the environment sends has a closed form: it is even, and there is nothing but one body.
+    pub fn closed_environment(&self) -> bool {
+        self.environment.is_some() && self.spheres.len() + self.pieces.len() == 1
+    }
+
+    /// Whether rays must look for light that no closed form gives.
+    pub fn must_find_light(&self) -> bool {
+        let open = self.shining().any(|(k, _)| self.lobes > 0 || !self.closed[k]);
+        open || self.environment.is_some() && !self.closed_environment()
+    }
+
+    /// What the only material there is shows in an even environment.
+    pub(super) fn surround(&self) -> Option<Surround> {
+        let owner = self.spheres.first().map(|s| s.1).or(self.pieces.first().map(|p| p.1))?;
+        let material = self.materials.get(owner as usize).filter(|_| owner >= 0.0 && self.closed_environment())?;
+        Some(Surround::new(material))
+    }
+
+    /// The lights that have a surface, with their indices.
+    pub(super) fn shining(&self) -> impl Iterator<Item = (usize, &'a QuadLight)> {
         self.lights.iter().enumerate().filter_map(|(i, light)| match light {
-            Light::Quad(quad) => Some((light_number(i), quad)),
+            Light::Quad(quad) => Some((i, quad)),
             _ => None,
         })
     }
@@ -115,7 +171,7 @@ fn number(owner: Owner) -> OwnerNumber {
     }
 }
 
-fn light_number(light: usize) -> OwnerNumber {
+pub(super) fn light_number(light: usize) -> OwnerNumber {
     -1.0 - light as f64
 }
 

@@ -22,6 +22,8 @@ pub(super) struct LobesAt<S: Simd> {
     phong: [Phong<S>; MOST_LOBES],
     count: usize,
     pub black: Mask<S>,
+    /// Where there are no Phong lobes.
+    pub plain: Mask<S>,
 }
 
 /// Axes of the local frame.
@@ -70,11 +72,15 @@ impl FlatScene<'_> {
             phong: [nothing; MOST_LOBES],
             count: self.lobes,
             black: zero.above(zero),
+            plain: one.above(zero),
         };
         for (m, material) in self.materials.iter().enumerate() {
             let here = owner.is(zero.number(m as f64));
             found.diffuse = here.select3(none.vector(material.diffuse), found.diffuse);
             found.diffuse_share = here.select(zero.number(material.diffuse_share), found.diffuse_share);
+            if !material.phong.is_empty() {
+                found.plain = found.plain & !here;
+            }
             if material.black {
                 found.black = found.black | here;
             }
@@ -106,6 +112,12 @@ fn ln_cos_alpha<S: Simd>(wi: Vec3<S>, wo: Vec3<S>) -> Lanes<S> {
 }
 
 impl<S: Simd> LobesAt<S> {
+    /// Weight of the Lambert lobe.
+    #[inline(always)]
+    pub fn diffuse(&self) -> Vec3<S> {
+        self.diffuse
+    }
+
     /// Values (1/sr) and densities of drawing `wi` (1/sr), for local directions above the horizon.
     #[inline(always)]
     pub fn evaluate<const GLOSSY: bool>(&self, wi: Vec3<S>, wo: Vec3<S>) -> (Vec3<S>, Lanes<S>) {

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::super::ray::gamma;
 use super::super::shapes::Sphere;
 use super::flat::{FlatScene, Piece};
+use super::occluders::Occluders;
 use crate::numeric::lanes::{Mask, Vec3};
 use crate::numeric::simd::{Lanes, Simd};
 
@@ -123,17 +124,19 @@ impl FlatScene<'_> {
         let at = round_or_flat(round, (center, radius), (point, normal, reach), p);
         Met { hit, at, owner }
     }
+}
 
-    /// Whether anything, seen from either side, lies on the rays.
+impl Occluders {
+    /// Whether any of them, seen from either side, lies on the rays.
     #[inline(always)]
-    pub(super) fn occluded<S: Simd>(&self, rays: &Rays<S>) -> Mask<S> {
+    pub(super) fn hide<S: Simd>(&self, rays: &Rays<S>) -> Mask<S> {
         let zero = rays.t_max.number(0.0);
         let mut hidden = zero.above(zero);
-        for (sphere, _) in &self.spheres {
+        for sphere in &self.spheres {
             let t = sphere_t(sphere, rays);
             hidden = hidden | (t.above(zero) & rays.t_max.above(t));
         }
-        for (piece, _) in &self.pieces {
+        for piece in &self.pieces {
             let t = piece_t(piece, rays);
             hidden = hidden | (t.above(zero) & rays.t_max.above(t));
         }

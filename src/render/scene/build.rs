@@ -9,9 +9,9 @@ use super::super::RenderError;
 use super::super::lights::{Environment, Light};
 use super::super::material::{Material, Materials, PhongEquation};
 use super::super::shapes::{Geometry, Owner};
-use super::CameraSpec;
 use super::parts::{Files, common_origin, environment, geometry, lights};
 use super::spec::{MaterialSpec, SceneSpec};
+use super::{CameraSpec, Filter};
 use crate::brdf::Reflectance;
 
 /// A scene to be rendered.
@@ -19,6 +19,7 @@ use crate::brdf::Reflectance;
 pub struct Scene {
     pub(crate) name: String,
     pub(crate) camera: CameraSpec,
+    pub(crate) filter: Filter,
     /// What was subtracted from every position.
     pub(crate) origin: DVec3,
     pub(crate) max_bounces: u32,
@@ -46,6 +47,7 @@ impl Scene {
         Ok(Self {
             name: spec.name.clone(),
             camera: spec.camera.clone(),
+            filter: spec.film.filter,
             origin,
             max_bounces: spec.max_bounces,
             geometry,

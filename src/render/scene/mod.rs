@@ -17,6 +17,6 @@ pub use light_spec::{
     SphereLightSpec, SpotLightSpec,
 };
 pub use spec::{
-    BuiltInMesh, CameraSpec, EquationSpec, FilmSpec, MaterialSpec, MeshNormals, MeshSpec, PhongLobeSpec, PlacementSpec,
-    PlaneSpec, QuadSpec, SceneSpec, SphereSpec,
+    BuiltInMesh, CameraSpec, EquationSpec, FilmSpec, Filter, MaterialSpec, MeshNormals, MeshSpec, PhongLobeSpec,
+    PlacementSpec, PlaneSpec, QuadSpec, SceneSpec, SphereSpec,
 };

@@ -51,11 +51,11 @@ pub struct SceneSpec {
     pub lights: LightsSpec,
 }
 
-/// A pinhole camera.
+/// A camera: a pinhole, or a thin lens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
-    /// Where the pinhole is, m.
+    /// Where the pinhole or the middle of the lens is, m.
     pub position: [f64; 3],
     /// A point in the middle of the picture, m; not the position.
     pub target: [f64; 3],
@@ -64,6 +64,12 @@ pub struct CameraSpec {
     pub up: [f64; 3],
     /// Full field of view along x, degrees, above 0 and below 180. Pixels are square.
     pub fov_deg: f64,
+    /// Radius of a thin lens, m, at least 0; 0, the default, is a pinhole.
+    #[serde(default)]
+    pub lens_radius: f64,
+    /// Distance along the line of sight at which a lens is in focus, m, above 0; the target's when none is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focus_distance: Option<f64>,
 }
 
 impl CameraSpec {
@@ -80,11 +86,26 @@ pub struct FilmSpec {
     pub resolution: [u32; 2],
     /// Samples per pixel, 1 to 2²⁴.
     pub samples: u32,
+    /// How points of the picture count for pixels.
+    pub filter: Filter,
+}
+
+/// The weight of a point of the picture for a pixel, by its distance from the pixel's middle; all integrate to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Filter {
+    /// The pixel's own area counts evenly: pixels know nothing of each other's light, as comparisons want it.
+    #[default]
+    Box,
+    /// A pyramid two pixels wide.
+    Tent,
+    /// A Gaussian of half a pixel, cut off at 1.5 pixels: smoother edges.
+    Gaussian,
 }
 
 impl Default for FilmSpec {
     fn default() -> Self {
-        Self { resolution: [512, 512], samples: 64 }
+        Self { resolution: [512, 512], samples: 64, filter: Filter::Box }
     }
 }
 

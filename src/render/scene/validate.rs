@@ -90,6 +90,16 @@ impl SceneSpec {
         check.direction("camera.up", camera.up)?;
         let fov = camera.fov_deg;
         check.holds(fov > 0.0 && fov < 180.0, "camera.fov_deg", fov, "above 0 and below 180")?;
+        let radius = camera.lens_radius;
+        check.holds(
+            radius.is_finite() && radius >= 0.0,
+            "camera.lens_radius",
+            radius,
+            "a finite number of at least 0",
+        )?;
+        if let Some(focus) = camera.focus_distance {
+            check.radius("camera.focus_distance", focus)?;
+        }
         let forward = (DVec3::from(camera.target) - DVec3::from(camera.position)).try_normalize();
         let forward = forward
             .ok_or_else(|| check.fail("camera.target", camera.target, "a point other than `camera.position`"))?;

@@ -69,6 +69,12 @@ impl Geometry {
         (self.triangles.is_none() && self.instances.is_none()).then_some((&self.spheres, &self.planes, &self.quads))
     }
 
+    /// Number of shapes, all meshes that stand in one place together being one.
+    pub fn shapes(&self) -> usize {
+        let placed = self.instances.as_ref().map_or(0, Instances::len);
+        self.spheres.len() + self.planes.len() + self.quads.len() + usize::from(self.triangles.is_some()) + placed
+    }
+
     /// The surface that the ray meets first.
     pub fn closest(&self, ray: &Ray) -> Option<Surface> {
         let (mut t_max, mut best) = (ray.t_max, None);

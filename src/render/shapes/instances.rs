@@ -85,6 +85,11 @@ impl Instances {
         Some(Self { bvh, items: order.iter().map(|i| items[*i as usize].clone()).collect() })
     }
 
+    /// Number of placed meshes.
+    pub fn len(&self) -> usize {
+        self.items.len()
+    }
+
     /// The instance and its triangle that the ray meets first, with the distance in the scene.
     pub fn closest(&self, ray: &Ray) -> Option<(f64, usize, TriangleHit)> {
         let mut found = None;

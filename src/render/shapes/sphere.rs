@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::super::ray::{Ray, SurfacePoint, gamma};
 
 /// A sphere, lit outside.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sphere {
     /// Centre, m.
     pub center: DVec3,

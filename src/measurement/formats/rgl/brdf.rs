@@ -227,8 +227,8 @@ impl Brdf for RglBrdf {
         if !above(wo, wo) {
             return None;
         }
-        let square = DVec2::new(u[0], u[1]);
-        let wi = if u[2] < Self::COSINE_SHARE {
+        let square = DVec2::new(u[1], u[2]);
+        let wi = if u[0] < Self::COSINE_SHARE {
             cosine_hemisphere(square)
         } else {
             let signs = self.symmetry.signs(wo).extend(1.0);

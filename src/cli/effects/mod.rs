@@ -1,25 +1,44 @@
-//! `goniofit effects`: which effects a simulation calls for, why, what each costs, and how far readings would be off without it.
+//! `goniofit effects`: which effects a simulation or a scene calls for, why, what each costs, and how far the result would be off without it.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use serde_json::json;
 
+mod of_scene;
+
 use super::failure::Failure;
+use super::output::read_text;
+use super::render::{parse_size, read_stage};
 use super::simulation::{Plan, What};
 use super::ui::Ui;
-use crate::chain;
+use crate::chain::{self, Stage};
 use crate::gonio::{ACCURACY, Change, Contribution, Contributions};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit effects lab.toml --material satin --scan in-plane:5
-  goniofit effects --instrument lab.toml --material gold.json --json")]
+  goniofit effects --instrument lab.toml --material gold.json --json
+  goniofit effects my-scene.toml
+  goniofit effects --scene cornell --material gold.json")]
 pub(super) struct Args {
     #[command(flatten)]
     what: What,
+    /// A built-in scene (see `goniofit scenes`); a SPEC that has a camera is a scene too
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["spec", "scan", "instrument", "electrons", "read_noise", "readings", "noiseless"])]
+    scene: Option<String>,
+    /// Size of a scene's pictures in pixels, WIDTHxHEIGHT or one number for both [default: 128 at most, in the scene's proportions]
+    #[arg(long, value_parser = parse_size, value_name = "SIZE")]
+    size: Option<(u32, u32)>,
+    /// Samples per pixel of a scene's pictures [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    samples: Option<u32>,
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    if let Some(stage) = scene(args)? {
+        return of_scene::run(&stage, args, ui);
+    }
     let plan = Plan::new(&args.what, None)?;
     let (source, name) = plan.load()?;
     let found = chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
@@ -37,6 +56,19 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     });
     ui.result(&table(&plan, &found), &object);
     Ok(())
+}
+
+/// The scene, if it is one.
+fn scene(args: &Args) -> Result<Option<Stage>, Failure> {
+    if let Some(name) = &args.scene {
+        return Ok(Some(Stage::built_in(name)?));
+    }
+    let Some(path) = &args.what.spec else { return Ok(None) };
+    if path == Path::new("-") {
+        return Ok(None); // a simulation: stdin can be read only once
+    }
+    let is_scene = read_text(path)?.parse::<toml::Table>().is_ok_and(|table| table.contains_key("camera"));
+    if is_scene { Ok(Some(read_stage(path)?)) } else { Ok(None) }
 }
 
 /// Effects that are on with their numbers, then those that are off with the reason; no wider than 100 columns.

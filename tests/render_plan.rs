@@ -1,0 +1,185 @@
+//! The plan of effects changes nothing: whatever a scene calls for, its picture is that of the full integrator.
+
+#![allow(clippy::expect_used, clippy::panic, clippy::float_cmp)] // these are tests
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use common::{excess, mean, picture, scene};
+use glam::DVec3;
+use goniofit::control::Control;
+use goniofit::numeric::random::{Purpose, RngExt, Stream, stream};
+use goniofit::render::{Film, Options, Plan, Scene, render};
+
+/// The picture by the full integrator.
+fn full(scene: &Scene, size: u32, samples: u32, seed: u64) -> Film {
+    let options = Options { width: size, height: size, samples, seed, plan: Some(Plan::FULL), ..Options::default() };
+    render(scene, &options, Control::silent()).expect("options are in range")
+}
+
+fn number(rng: &mut Stream, low: f64, high: f64) -> f64 {
+    low + (high - low) * rng.random::<f64>()
+}
+
+fn triple(rng: &mut Stream, low: f64, high: f64) -> String {
+    format!("[{:.3}, {:.3}, {:.3}]", number(rng, low, high), number(rng, low, high), number(rng, low, high))
+}
+
+/// A scene of a few shapes under a few lights.
+fn generated(rng: &mut Stream) -> String {
+    let bounces = 1 + rng.random_range(0..4u32);
+    let mut text = format!(
+        "version = 1\nname = \"generated\"\nmax_bounces = {bounces}\n[camera]\nposition = [0, 1.5, 6]\n\
+         target = [0, 0.7, 0]\nfov_deg = 40\n"
+    );
+    if rng.random_range(0..4u32) == 0 {
+        text += "lens_radius = 0.2\n";
+    }
+    text += "[materials]\n";
+    for name in ["a", "b"] {
+        let phong = match rng.random_range(0..2u32) {
+            0 => String::new(),
+            _ => format!(", phong = [{{ ks = {}, n = {:.1} }}]", triple(rng, 0.1, 0.5), number(rng, 0.0, 80.0)),
+        };
+        let _ = writeln!(text, "{name} = {{ kd = {}{phong} }}", triple(rng, 0.05, 0.5));
+    }
+    let shapes = [0u32, 1, 1, 2, 3][rng.random_range(0..5usize)];
+    for _ in 0..shapes.max(1) {
+        let _ = writeln!(
+            text,
+            "[[sphere]]\ncenter = [{:.3}, {:.3}, {:.3}]\nradius = {:.3}\nmaterial = \"{}\"",
+            number(rng, -1.2, 1.2),
+            number(rng, 0.3, 1.4),
+            number(rng, -1.0, 1.0),
+            number(rng, 0.2, 0.7),
+            if rng.random::<bool>() { "a" } else { "b" }
+        );
+    }
+    if shapes > 0 && rng.random::<bool>() {
+        text += "[[plane]]\npoint = [0, -0.5, 0]\nnormal = [0, 1, 0]\nmaterial = \"b\"\n";
+    }
+    if shapes > 1 && rng.random::<bool>() {
+        text += "[[quad]]\ncenter = [0, 1, -2]\nu = [2, 0, 0]\nv = [0, 1.5, 0]\nmaterial = \"a\"\n";
+    }
+    let lights = rng.random_range(1..64u32);
+    if lights & 1 == 1 {
+        let _ = writeln!(
+            text,
+            "[[light.point]]\nposition = [{:.3}, 4, 3]\nintensity = [20, 15, 10]",
+            number(rng, -3.0, 3.0)
+        );
+    }
+    if lights & 2 == 2 {
+        text += "[[light.directional]]\ntoward = [1, 2, 1]\nirradiance = [0.5, 1, 1.5]\n";
+    }
+    if lights & 4 == 4 {
+        let (x, size) = (number(rng, -2.0, 2.0), number(rng, 0.2, 1.2));
+        let _ = writeln!(
+            text,
+            "[[light.quad]]\ncenter = [{x:.3}, 3.5, 1]\nu = [{size:.3}, 0, 0.1]\nv = [0, 0, {size:.3}]\nradiance = [3, 4, 5]"
+        );
+    }
+    if lights & 24 == 24 {
+        text += "[light.environment]\nradiance = [0.3, 0.2, 0.4]\n";
+    }
+    if lights & 48 == 48 {
+        text += "[[light.sphere]]\ncenter = [-3, 3, 2]\nradius = 0.4\nradiance = [5, 5, 5]\n";
+    }
+    text
+}
+
+#[test]
+fn every_plan_shows_what_the_full_integrator_shows() {
+    let mut plans = BTreeSet::new();
+    let mut rng = stream(11, Purpose::Study, 0);
+    for case in 0..60 {
+        let text = generated(&mut rng);
+        let built = scene(&text);
+        let plan = Plan::of(&built);
+        plans.insert([plan.shadows, plan.interreflection, plan.chance, plan.closed_forms, plan.packets]);
+        let (by_plan, noise) = mean(&picture(&built, 24, 64, 2 * case));
+        let (by_all, full_noise) = mean(&full(&built, 24, 64, 2 * case + 1));
+        // 180 tests: 5 σ by chance once in ten thousand runs.
+        let bound = 5.0 * (noise * noise + full_noise * full_noise).map(f64::sqrt);
+        let off = excess(by_plan, by_all, bound + 1e-12 * by_all.abs());
+        assert!(off <= 1.0, "case {case}, {plan:?}: {by_plan} ± {noise} against {by_all} ± {full_noise}\n{text}");
+    }
+    assert!(plans.len() >= 10, "too few kinds of plans: {plans:?}");
+    for k in 0..5 {
+        assert!(plans.iter().any(|p| p[k]) && plans.iter().any(|p| !p[k]), "flag {k} is the same in all: {plans:?}");
+    }
+}
+
+/// Where nothing is left to chance but the point in the pixel, which both take alike.
+#[test]
+fn without_sampling_plans_agree_to_rounding() {
+    let mut rng = stream(12, Purpose::Study, 0);
+    for _ in 0..10 {
+        let text = format!(
+            "version = 1\nname = \"lone\"\nmax_bounces = 5\n[camera]\nposition = [0, 1, 5]\ntarget = [0, 0, 0]\nfov_deg = 40\n\
+             lens_radius = 0.1\n[materials]\na = {{ kd = {}, phong = [{{ ks = {}, n = {:.2} }}] }}\n[[sphere]]\ncenter = [0, 0, 0]\n\
+             radius = 1\nmaterial = \"a\"\n[[light.point]]\nposition = {}\nintensity = [9, 8, 7]\n[[light.directional]]\n\
+             toward = [1, 2, 3]\nirradiance = [1, 2, 3]\n",
+            triple(&mut rng, 0.1, 0.5),
+            triple(&mut rng, 0.1, 0.5),
+            number(&mut rng, 0.0, 500.0),
+            triple(&mut rng, 2.0, 4.0),
+        );
+        let built = scene(&text);
+        let plan = Plan::of(&built);
+        assert!(!plan.shadows && !plan.interreflection && !plan.chance && plan.packets, "{plan:?}");
+        let (a, b) = (picture(&built, 32, 8, 1), full(&built, 32, 8, 1));
+        let (mut far, pixels) = (0, (0..32).flat_map(|y| (0..32).map(move |x| (x, y))));
+        for (x, y) in pixels {
+            let (p, q) = (a.radiance(x, y).expect("pixel"), b.radiance(x, y).expect("pixel"));
+            far += u32::from(excess(p, q, 1e-9 * q.abs() + DVec3::splat(1e-15)) > 1.0);
+        }
+        // A ray that just grazes the outline may miss it by rounding.
+        assert!(far <= 1, "{far} pixels differ\n{text}");
+    }
+}
+
+/// What has a closed form has no noise but that of the outline, and the value that sampling finds.
+#[test]
+fn closed_forms_leave_no_noise() {
+    let lone = |material: &str, light: &str| {
+        scene(&format!(
+            "version = 1\nname = \"closed\"\nmax_bounces = 4\n[camera]\nposition = [0, 0, 3]\ntarget = [0, 0, 0]\nfov_deg = 1e-4\n\
+             [materials]\na = {material}\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"a\"\n{light}"
+        ))
+    };
+    let quad = "[[light.quad]]\ncenter = [1, 2, 2]\nu = [1, 0, 0]\nv = [0, -1, 1]\nradiance = [1, 2, 3]\n";
+    let sky = "[light.environment]\nradiance = [1, 2, 3]\n";
+    let phong = "{ kd = [0.1, 0.2, 0.3], phong = [{ ks = [0.4, 0.3, 0.2], n = 30 }] }";
+    for (material, light) in [("{ kd = [0.5, 0.4, 0.3] }", quad), ("{ kd = [0.5, 0.4, 0.3] }", sky), (phong, sky)] {
+        let built = lone(material, light);
+        assert!(Plan::of(&built).closed_forms && !Plan::of(&built).chance);
+        let (closed, noise) = mean(&picture(&built, 2, 64, 1));
+        assert!(excess(noise, DVec3::ZERO, 1e-5 * closed) <= 1.0, "{noise} of {closed}");
+        let (sampled, noise) = mean(&full(&built, 8, 4096, 2));
+        assert!(excess(closed, sampled, 4.5 * noise + 1e-6 * closed) <= 1.0, "{closed} against {sampled} ± {noise}");
+        assert!(noise.max_element() < 2e-3 * sampled.max_element(), "the check is sharp");
+    }
+}
+
+#[test]
+fn a_plan_says_what_is_on_and_why() {
+    let of = |name: &str| {
+        let spec = goniofit::render::scene::builtin(name).expect("built in");
+        let built =
+            Scene::build(&spec, std::path::Path::new("."), &goniofit::render::Materials::new()).expect("builds");
+        let plan = Plan::of(&built);
+        (plan, plan.effects(&built))
+    };
+    let (sphere, words) = of("sphere");
+    assert!(!sphere.shadows && !sphere.interreflection && !sphere.chance && sphere.packets);
+    assert!(words.effects.iter().all(|e| !e.why.is_empty()));
+    let (plane, _) = of("sphere-on-plane");
+    assert!(plane.shadows && plane.interreflection && plane.chance);
+    let (furnace, _) = of("furnace");
+    assert!(furnace.closed_forms && !furnace.chance && !furnace.shadows);
+    let (mesh, _) = of("mesh-env");
+    assert!(mesh.shadows && !mesh.packets);
+}
