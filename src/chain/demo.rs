@@ -106,7 +106,7 @@ fn measured(
         Some((_, instrument)) if !instrument.is_plain() => {
             let raw = measure_raw(MATERIAL, source, instrument, &scan, options.seed, control)?;
             write_bytes(&folder.join("raw.csv"), raw.to_csv(instrument).as_bytes())?;
-            reduced(MATERIAL, &raw, instrument)?.measurement
+            reduced(MATERIAL, &raw.as_written(), instrument)?.measurement
         }
         other => {
             let instrument = other.as_ref().map_or_else(Instrument::default, |(_, own)| own.clone());

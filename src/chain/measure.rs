@@ -26,7 +26,7 @@ pub fn measure(
     control: Control<'_>,
 ) -> Result<Measurement, ChainError> {
     if !instrument.is_plain() {
-        let raw = measure_raw(name, source, instrument, scan, seed, control)?;
+        let raw = measure_raw(name, source, instrument, scan, seed, control)?.as_written();
         let mut measurement = reduced_until(name, &raw, instrument, control.stop)?.measurement;
         measurement.origin = format!("simulated, scan {scan}, seed {seed}");
         return Ok(measurement);

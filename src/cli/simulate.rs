@@ -76,6 +76,8 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         if let Some(path) = &args.raw {
             write_text(path, &raw.to_csv(&plan.instrument))?;
         }
+        // So that `reduce` of the raw file gives the same bytes.
+        let raw = raw.as_written();
         let mut table = chain::reduced_until(&name, &raw, &plan.instrument, ui.control().stop)?.measurement;
         if args.raw.is_none() {
             table.origin = format!("simulated, scan {}, seed {}", plan.scan, plan.seed);

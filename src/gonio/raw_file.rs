@@ -35,6 +35,16 @@ fn angle_names(dimension: Dimension) -> &'static [&'static str] {
     if dimension == Dimension::Flat { &FLAT_ANGLES } else { &ANGLES }
 }
 
+/// θ and φ (deg) that a direction is written as; in the flat world θ alone, φ being 0.
+fn angles(dimension: Dimension, w: DVec3) -> [f64; 2] {
+    if dimension == Dimension::Flat { [flat_deg(w), 0.0] } else { spherical_deg(w) }
+}
+
+/// The stop of a reading that comes after another: the same where nothing has moved.
+fn stop_after(before: Option<Reading>, kind: Kind, entry: Option<u32>) -> u32 {
+    before.map_or(0, |b| b.stop + u32::from(b.kind != kind || b.entry != entry))
+}
+
 impl Raw {
     /// The text of a file.
     #[must_use]
@@ -63,15 +73,33 @@ impl Raw {
         text
     }
 
+    /// The readings as [`Self::from_csv`] gives them back from [`Self::to_csv`], but for pairs of directions that no reading belongs to: listed directions
+    /// are those that the text says, 10⁻¹⁵ off, and stops those that rows tell. What is made of them is then the same to the bit. A grid stays one.
+    #[must_use]
+    pub fn as_written(mut self) -> Self {
+        let dimension = self.dimension;
+        if let Directions::List { wi, wo } = &mut self.directions {
+            for w in wi.iter_mut().chain(wo) {
+                let [theta, phi] = angles(dimension, *w);
+                *w = direction_deg(theta, phi);
+            }
+        }
+        let mut before = None;
+        for reading in &mut self.readings {
+            reading.stop = stop_after(before, reading.kind, reading.entry);
+            before = Some(*reading);
+        }
+        self
+    }
+
     fn push_row(&self, i: usize, reading: &Reading, text: &mut String) {
+        let names = angle_names(self.dimension).len();
         match reading.entry.map(|e| self.directions.pair(e as usize)) {
-            Some((wi, wo)) if self.dimension == Dimension::Flat => {
-                [wi, wo].into_iter().for_each(|w| push_number(text, flat_deg(w)));
-            }
             Some((wi, wo)) => {
-                [spherical_deg(wi), spherical_deg(wo)].into_iter().flatten().for_each(|a| push_number(text, a));
+                let of = |w| angles(self.dimension, w).into_iter().take(names / 2);
+                of(wi).chain(of(wo)).for_each(|a| push_number(text, a));
             }
-            None => (0..angle_names(self.dimension).len()).for_each(|_| text.push(',')),
+            None => (0..names).for_each(|_| text.push(',')),
         }
         text.push_str(reading.kind.name());
         text.push(',');
@@ -287,7 +315,7 @@ impl Rows<'_> {
             let signal = signal.map_err(|_| wrong(&format!("{SIGNAL}{name}"), "a number, or nothing", text))?;
             self.list.signal.push(signal);
         }
-        let stop = before.map_or(0, |b| b.stop + u32::from(b.kind != kind || b.entry != entry));
+        let stop = stop_after(before, kind, entry);
         self.list.readings.push(Reading { kind, entry, time_s, exposure_s, repeat, stop });
         Ok(())
     }

@@ -246,3 +246,32 @@ fn wrong_inputs_are_named_as_they_were_typed_with_what_is_expected() {
     b.ok(&["reduce", "sub/hand.csv", "--instrument", "raw.csv", "--out", "x.csv"]);
     assert_eq!(b.text("x.csv").lines().last(), b.text("m.csv").lines().last());
 }
+
+/// A raw file's angles are text, 10⁻¹⁵ off the directions that were simulated: both ways to a measurement take those of the text.
+#[test]
+fn reducing_the_raw_file_gives_what_simulate_writes_to_the_byte() {
+    let b = Bench::new();
+    let flat = r#"{"format": "goniofit-material", "version": 1, "model": "lambert2d+phong2d", "channels": ["y"], "lobes":
+        [{"kind": "lambert2d", "weight": [0.4]}, {"kind": "phong2d", "weight": [0.1], "shape": {"exponent": 40}}]}"#;
+    b.write("flat.json", flat);
+    b.write("repeated.csv", "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg\n".to_owned() + &"31,180,17,1.3\n".repeat(3));
+    let points = "version = 1\n[instrument]\nread_noise = 3\n[instrument.axes]\njitter_deg = 0.1\n[instrument.protocol]\nblock = 2\n";
+    b.write("points.toml", points);
+    for (material, instrument, scan) in [
+        ("glossy-paint", "commercial", "in-plane:7.3"),
+        ("glossy-paint", "standards-lab", "hemisphere:26"),
+        ("satin", "robot", "hemisphere:29"),
+        ("satin", "commercial", "adaptive:230"),
+        ("flat.json", "classroom", "flat:13"),
+        // A block ends within a stop, and no visit stands between.
+        ("satin", "points.toml", "list:repeated.csv"),
+    ] {
+        let args = ["simulate", "--material", material, "--instrument", instrument, "--scan", scan];
+        b.ok(&[&args[..], &["--raw", "raw.csv", "--out", "m.csv"]].concat());
+        b.ok(&["reduce", "raw.csv", "--out", "reduced.csv"]);
+        assert!(b.bytes("m.csv") == b.bytes("reduced.csv"), "{instrument}, {scan}");
+        // And without a raw file.
+        b.ok(&[&args[..], &["--out", "plain.csv"]].concat());
+        assert!(b.bytes("m.csv") == b.bytes("plain.csv"), "{instrument}, {scan}");
+    }
+}

@@ -143,7 +143,8 @@ pub(crate) fn spherical_deg(w: DVec3) -> [f64; 2] {
 pub(crate) fn flat_deg(w: DVec3) -> f64 {
     let theta = refine(w.x.atan2(w.z).to_degrees(), w.x, w.z);
     let rounded = round(theta);
-    if (direction_deg(rounded, 0.0) - w).abs().max_element() <= f64::EPSILON { rounded } else { theta }
+    let exact = if (direction_deg(rounded, 0.0) - w).abs().max_element() <= f64::EPSILON { rounded } else { theta };
+    exact + 0.0 // −0 is 0
 }
 
 /// `degrees` corrected by one Newton step towards the angle with this sine and cosine: what conversion and atan2 rounded.
@@ -184,7 +185,7 @@ mod tests {
                 let bits = |angles: [f64; 2]| angles.map(f64::to_bits);
                 assert_eq!(bits(spherical_deg(direction_deg(theta, phi))), bits(want), "{theta} {phi}");
                 let flat = flat_deg(direction_deg(phi / 2.0, 0.0));
-                assert_eq!((flat + 0.0).to_bits(), (phi / 2.0 + 0.0).to_bits(), "{phi}");
+                assert_eq!(flat.to_bits(), (phi / 2.0 + 0.0).to_bits(), "{phi}");
             }
         }
         let tiny = spherical_deg(direction_deg(1e-9, 30.0));
