@@ -1,5 +1,7 @@
 //! What the lobes have in common: their parameters, the coordinate they depend on, their basis values.
 
+use std::time::Instant;
+
 use glam::DVec3;
 
 use super::{lambert, phong};
@@ -60,6 +62,16 @@ pub trait Sight: Send + Sync + std::fmt::Debug {
     /// Where a pair of directions stands: two numbers that do not depend on a shape. `None` where what is averaged over reaches below the horizon,
     /// so that lobes have no value to compare a reading with.
     fn place(&self, wi: DVec3, wo: DVec3) -> Option<[f64; 2]>;
+
+    /// Makes what [`Self::fill`] of this shape needs, as long as `until` is not past; whether all is there.
+    fn prepare(&self, _kind: LobeKind, _shape: &[f64], _until: Instant) -> bool {
+        true
+    }
+
+    /// Of one whose time is over, so that all lobes it has filled since are 0: how many shapes had been made before.
+    fn made_when_ended(&self) -> Option<u32> {
+        None
+    }
 
     /// As [`Lobe::fill`], at such places.
     fn fill(

@@ -82,6 +82,7 @@ impl From<FitError> for Failure {
             | FitError::LimitTwice { .. }
             | FitError::Overflow { .. }
             | FitError::Underflow { .. } => Self::usage(message),
+            FitError::OutOfTime { .. } => Self::work(format!("--{message}")),
             _ => Self::work(message),
         }
     }

@@ -9,6 +9,7 @@ use super::loss::Loss;
 use super::options::{FitError, FitOptions};
 use super::part::{self, Part};
 use super::samples::{Samples, Thin};
+use super::timed;
 use crate::brdf::{FitRecord, ModelSpec};
 use crate::measurement::{Directions, Measurement};
 use crate::numeric::stats::chi_square_quantile;
@@ -55,6 +56,7 @@ pub(super) fn fit(
     let clock = Instant::now();
     let whole_is_quick = whole_is_quick(measurement, options);
     let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
+    let mut before: Option<Part> = None;
     loop {
         let began = Instant::now();
         let gathered = Samples::gather(measurement, model, options, channels, Thin { step: thin, run: 1 });
@@ -64,7 +66,12 @@ pub(super) fn fit(
         }
         let (mut samples, transforms) = gathered?;
         samples.are_drawn = thin > 1;
-        let mut part = part::fit(&samples, transforms, model, ranges, options)?;
+        let part = part::fit(&samples, transforms, model, ranges, options);
+        if let Err(error) = timed::check(options) {
+            // The round before this one is what the time was enough for.
+            return before.map(Part::out_of_time).ok_or(error);
+        }
+        let mut part = part?;
         let round = began.elapsed();
         let listed = bootstrap::listed(&samples, options);
         if thin > 1 {
@@ -76,15 +83,23 @@ pub(super) fn fit(
                 let needed = round.mul_f64(longer) + drawings.mul_f64(thin as f64 / next as f64);
                 subset.out_of_time = !fits(time, clock.elapsed() + needed);
             }
+            part.subset = Some(subset);
             if !met && !subset.out_of_time {
-                thin = next;
+                (thin, before) = (next, Some(part));
                 continue;
             }
-            part.subset = Some(subset);
         }
         let deadline = time.and_then(|time| clock.checked_add(time));
         part.bootstrap = bootstrap::bootstrap(listed.as_ref(), &part, model, ranges, options, deadline)?;
-        return Ok(part);
+        return timed::check(options).map(|()| part);
+    }
+}
+
+impl Part {
+    /// A round after which the time ended.
+    fn out_of_time(mut self) -> Self {
+        self.subset = self.subset.map(|subset| Subset { out_of_time: true, ..subset });
+        self
     }
 }
 

@@ -11,6 +11,7 @@ use super::passes::{self, Saturation, Want};
 use super::reduced::Solution;
 use super::robust::{JUDGE_SCALE, bounded_cost, sizes};
 use super::samples::{Samples, Thin};
+use super::timed;
 use super::{Fitted, fit_since};
 use crate::brdf::{ModelCandidate, ModelChoice, ModelSpec};
 use crate::geometry::theta_of;
@@ -55,6 +56,7 @@ pub fn fit_best_model(measurement: &Measurement, options: &FitOptions) -> Result
         let last = models.last().filter(|_| !models.iter().any(|m| concerns(limit, m, measurement)));
         last.map_or(Ok(()), |richest| ranges_of(limit, richest, measurement).map(|_| ()))?;
     }
+    let options = &timed::timed(options, clock);
     let compared = compare(&models, measurement, options, clock)?;
     let choice = choose(&compared.tried);
     let model = choice.chosen.parse().map_err(|_| FitError::Solver { reason: "no model was chosen".into() })?;
@@ -158,7 +160,9 @@ fn compare_on(
         }
         let limits = options.limits.iter().filter(|l| concerns(l, model, measurement)).cloned().collect();
         let own = FitOptions { model: model.clone(), limits, bootstrap: None, time_budget: None, ..options.clone() };
-        numbered.push((place, candidate(measurement, &own, entries, &mut common)?));
+        let tried = candidate(measurement, &own, entries, &mut common);
+        timed::check(options)?;
+        numbered.push((place, tried?));
         if glossy == 1 {
             of_one_lobe = Some(began.elapsed());
         }

@@ -40,6 +40,7 @@ mod start;
 mod streamed;
 mod structure;
 mod tally;
+mod timed;
 mod transform;
 mod walk;
 
@@ -80,6 +81,7 @@ pub fn fit(measurement: &Measurement, options: &FitOptions) -> Result<Fitted, Fi
 /// Fits a model by work that began at `clock`: what is gone of a time budget is gone.
 fn fit_since(clock: Instant, measurement: &Measurement, options: &FitOptions) -> Result<Fitted, FitError> {
     options.validate(measurement)?;
+    let options = &timed::timed(options, clock);
     let model = options.model_for(measurement)?;
     let ranges = Ranges::new(&model, &measurement.channels, &options.limits)?;
     let all: Vec<usize> = (0..measurement.channels.len()).collect();

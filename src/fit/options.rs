@@ -232,6 +232,19 @@ pub enum FitError {
         /// Largest value.
         largest: f64,
     },
+    /// The time was over before there was a fit through an instrument.
+    #[error(
+        "time-budget: {budget:?} ended after lobes of {made} exponents were averaged over the cones of the instrument, before any fit was there; \
+         expected about {needed:?} or more"
+    )]
+    OutOfTime {
+        /// The time.
+        budget: Duration,
+        /// Exponents of which lobes were averaged.
+        made: u32,
+        /// About the time that it takes.
+        needed: Duration,
+    },
     /// The solver failed.
     #[error("the solver failed: {reason}")]
     Solver {

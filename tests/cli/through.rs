@@ -41,6 +41,34 @@ fn a_fit_through_points_or_of_the_flat_world_is_refused() {
     }
 }
 
+/// Lobes through cones take longer than all the rest of a fit: a time too short for them ends it, with an error that says what was done and what it takes.
+#[test]
+fn a_time_that_is_too_short_for_the_cones_ends_the_fit_and_says_so() {
+    let b = Bench::new();
+    let simulate = ["simulate", "--material", "glossy-paint", "--instrument", "classroom", "--scan", "in-plane:5"];
+    b.ok(&[&simulate[..], &["--out", "m.csv"]].concat());
+    let fit = ["fit", "m.csv", "--through", "classroom", "--out", "fit.json"];
+    let timed = |args: &[&str]| {
+        let clock = std::time::Instant::now();
+        (b.run(&[&fit[..], args].concat()), clock.elapsed())
+    };
+    let (free, whole) = timed(&[]);
+    let free = (free.code, b.json_file("fit.json")["lobes"].clone());
+    std::fs::remove_file(b.path("fit.json")).expect("was written");
+    for args in [&["--time-budget", "1ms"][..], &["--time-budget", "1ms", "--model", "auto"]] {
+        let (ran, took) = timed(args);
+        assert!(ran.code == Some(1) && !b.path("fit.json").exists(), "{ran:?}");
+        for says in ["--time-budget: 1ms ended after lobes of", "cones of the instrument", "expected about"] {
+            assert!(ran.err.contains(says), "{}", ran.err);
+        }
+        // One table is begun at most on each thread, of the hundred or so that a fit asks for.
+        assert!(took < whole / 2, "{took:?} of {whole:?}");
+    }
+    // A time that is enough changes no bit.
+    let (ran, _) = timed(&["--time-budget", "10min"]);
+    assert_eq!((ran.code, b.json_file("fit.json")["lobes"].clone()), free);
+}
+
 /// The same files, options and commands in the flat world.
 #[test]
 fn an_instrument_measures_the_flat_world() {

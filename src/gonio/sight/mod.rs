@@ -15,6 +15,7 @@ mod table;
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::DVec3;
 
@@ -67,6 +68,10 @@ impl Sight for Cones {
     fn place(&self, wi: DVec3, wo: DVec3) -> Option<[f64; 2]> {
         let above = theta_of(wi) + self.source.half < FRAC_PI_2 && theta_of(wo) + self.detector.half < FRAC_PI_2;
         above.then(|| [angle_between(mirror(wi), wo), wi.z / wo.z])
+    }
+
+    fn prepare(&self, _kind: LobeKind, shape: &[f64], until: Instant) -> bool {
+        shape.iter().all(|n| self.tables.prepare(*n, until))
     }
 
     fn fill(

@@ -30,7 +30,7 @@ impl<const F: usize> Table<F> {
     }
 
     /// The sum of these tables, which have the same ends, each times its weight.
-    pub fn sum(tables: &[Self; NODES], weights: &[f64; NODES]) -> Self {
+    pub fn sum(tables: &[&Self; NODES], weights: &[f64; NODES]) -> Self {
         let mut sum = tables[0].clone();
         for (k, piece) in sum.pieces.iter_mut().enumerate() {
             *piece = std::array::from_fn(|j| {
