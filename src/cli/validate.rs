@@ -1,9 +1,9 @@
-//! `goniofit validate`: a table and its fits under the same light.
+//! `goniofit validate`: a table and its fits under the same light; the fits alone where the table does not cover enough.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::comparison::sentence;
 use super::failure::Failure;
@@ -12,15 +12,15 @@ use super::output::{keeps_inputs, make_folder, write_text};
 use super::render::{PictureArgs, parse_exposure};
 use super::ui::{self, Ui};
 use crate::brdf::Material;
-use crate::chain::{self, Shown, Source, Stage};
+use crate::chain::{self, ChainError, Shown, Source, Stage};
 use crate::image::{Appearance, Comparison};
-use crate::measurement::formats;
+use crate::measurement::{Dimension, Measurement, MeasurementError, formats};
 use crate::render::{Material as Subject, Options};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  goniofit validate gold.binary gold.json --scene sphere-on-plane --out gold/")]
 pub(super) struct Args {
-    /// The measurement
+    /// The measurement; of one that does not cover enough to be rendered, an in-plane scan say, the fits are shown alone
     measurement: PathBuf,
     /// Fits of it
     #[arg(required = true, value_name = "FIT.json")]
@@ -48,20 +48,16 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let name = table.name.clone();
     let fits = args.fits.iter().map(|f| chain::load_material(f).map(|m| (f, m))).collect::<Result<Vec<_>, _>>()?;
     let options = args.picture.options(&stage);
-    let rgb = args.picture.rgb.as_ref();
     // Everything is resolved before anything is written.
-    let measured =
-        chain::render_material(&args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)), rgb)?;
-    let mut subjects = vec![("table".to_owned(), measured)];
-    for (file, material) in &fits {
-        let source = Source::Fitted(Box::new(material.clone()));
-        subjects.push((label(file, material, fits.len()), chain::render_material(file, &source, rgb)?));
+    let (subjects, missing) = subjects(args, table, &fits)?;
+    if let Some(reason) = &missing {
+        ui.warn(&alone(&args.measurement, reason, fits.len()));
     }
     make_folder("--out", &args.out)?;
     let mut shown = Vec::new();
-    for (k, (label, subject)) in subjects.into_iter().enumerate() {
+    for (k, subject) in subjects.into_iter().enumerate() {
         if !ui::stop().requested() {
-            shown.push(take(k, label, subject, &stage, &options, ui)?);
+            shown.push(take(k, subject, &stage, &options, ui)?);
         }
     }
     shown.retain(|shown| shown.image.metadata.samples != Some(0));
@@ -75,33 +71,118 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let subtitle =
         format!("{} scene, {} samples a pixel", stage.spec.name, reference.image.metadata.samples.unwrap_or(0));
     let gallery = chain::write_gallery(&args.out, &name, &subtitle, reference, others, args.exposure)?;
-    let rows: Vec<_> = (fits.iter().zip(&gallery.comparisons).enumerate())
-        .map(|(k, ((file, m), c))| json!({ "fit": file, "model": m.model(), "picture": format!("fit-{}.exr", k + 1), "maps": format!("maps-{}.png", k + 1), "image": c, "statement": sentence(c) }))
-        .collect();
+    // A fit that is the reference itself is compared with nothing.
+    let of_reference = usize::from(missing.is_some());
+    let compared = std::iter::repeat_n(None, of_reference).chain(gallery.comparisons.iter().map(Some));
+    let rows: Vec<_> = fits.iter().map(|(file, m)| (file.as_str(), m)).zip(compared).collect();
+    for (file, _) in fits.iter().skip(rows.len()) {
+        ui.warn(&format!("{file}: not rendered"));
+    }
     let object = json!({
         "measurement": args.measurement, "scene": stage.spec.name, "samples": options.samples, "seed": options.seed,
-        "exposure": gallery.exposure, "fits": rows, "out": args.out, "stopped": stopped,
+        "exposure": gallery.exposure, "reference": format!("{}.exr", reference.file), "table_not_rendered": missing,
+        "fits": rows.iter().enumerate().map(numbers).collect::<Vec<_>>(), "out": args.out, "stopped": stopped,
     });
     let numbers = serde_json::to_string_pretty(&object).map_err(|e| Failure::work(e.to_string()))?;
     write_text(&args.out.join("numbers.json"), &(numbers + "\n"))?;
-    let mut text = format!("{name}, {} scene, {} samples a pixel\n", stage.spec.name, options.samples);
-    let _ = writeln!(
-        text,
-        "  {:24} {:>9} {:>9} {:>6} {:>7} {:>6} {:>7}",
-        "", "rmse", "relMSE", "PSNR", "FLIP", "ΔE2000", "masked"
-    );
-    for (file, _) in fits.iter().skip(gallery.comparisons.len()) {
-        ui.warn(&format!("{file}: not rendered"));
+    let head = format!("{name}, {} scene, {} samples a pixel\n", stage.spec.name, options.samples);
+    for note in rows.iter().filter_map(|(_, c)| c.and_then(|c| c.note.as_ref())) {
+        ui.warn(note);
     }
-    for ((file, m), c) in fits.iter().zip(&gallery.comparisons) {
-        if let Some(note) = &c.note {
-            ui.warn(note);
-        }
-        text.push_str(&row(&format!("{file} ({})", m.model()), c));
-    }
-    let _ = writeln!(text, "  written to {}", args.out.display());
-    ui.result(&text, &object);
+    ui.result(&format!("{head}{}  written to {}\n", text(&rows), args.out.display()), &object);
     Ok(())
+}
+
+/// A fit's file and material, and its picture's comparison with the reference, if it is not that.
+type Row<'a> = ((&'a str, &'a Material), Option<&'a Comparison>);
+
+/// What is rendered, the reference first.
+struct Rendered {
+    file: String,
+    difference_file: String,
+    label: String,
+    material: Subject,
+}
+
+/// The table and its fits; the fits alone, with the reason, where the table does not cover enough to be rendered.
+fn subjects(
+    args: &Args,
+    table: Measurement,
+    fits: &[(&String, Material)],
+) -> Result<(Vec<Rendered>, Option<String>), Failure> {
+    let rgb = args.picture.rgb.as_ref();
+    let is_flat = table.dimension == Dimension::Flat;
+    let measured = chain::render_material(&args.measurement.to_string_lossy(), &Source::Measured(Box::new(table)), rgb);
+    let (measured, missing) = match measured {
+        Ok(material) => (Some(material), None),
+        Err(ChainError::Measurement(MeasurementError::Unsupported { reason, .. })) if !is_flat => (None, Some(reason)),
+        Err(error) => return Err(error.into()),
+    };
+    let of_table = measured.map(|material| Rendered {
+        file: "table".into(),
+        difference_file: String::new(),
+        label: "table".into(),
+        material,
+    });
+    let of_fit = |(k, (file, fit)): (usize, &(&String, Material))| {
+        Ok(Rendered {
+            file: format!("fit-{}", k + 1),
+            difference_file: format!("difference-{}", k + 1),
+            label: label(file, fit, fits.len()),
+            material: chain::render_material(file, &Source::Fitted(Box::new(fit.clone())), rgb)?,
+        })
+    };
+    let of_fits = fits.iter().enumerate().map(of_fit).collect::<Result<Vec<_>, Failure>>()?;
+    Ok((of_table.into_iter().chain(of_fits).collect(), missing))
+}
+
+/// What a table that can't be rendered leaves to see, and what to do about it.
+fn alone(measurement: &Path, reason: &str, fits: usize) -> String {
+    // The fits are there.
+    let reason = reason.trim_end_matches("; fit a model and render that");
+    let rest = match fits {
+        1 => "the picture is of the fit alone, compared with nothing; give another fit to see them side by side",
+        _ => "pictures are of the fits alone, each compared with the first",
+    };
+    format!(
+        "{}: the table itself can't be rendered: {reason}: {rest}. How well a fit meets the readings is its own rmse; to see it beside the table, \
+         measure the hemisphere (--scan hemisphere:5, say)",
+        measurement.display()
+    )
+}
+
+/// A fit in numbers.json.
+fn numbers((k, ((file, fit), compared)): (usize, &Row<'_>)) -> Value {
+    json!({
+        "fit": file, "model": fit.model(), "picture": format!("fit-{}.exr", k + 1),
+        "maps": compared.map(|_| format!("maps-{}.png", k + 1)), "image": compared, "statement": compared.map(sentence),
+        "rmse_of_fit": fit.fit.as_ref().map(|f| f.rmse),
+    })
+}
+
+/// All fits as text.
+fn text(rows: &[Row<'_>]) -> String {
+    let mut text = String::new();
+    if rows.iter().any(|(_, c)| c.is_some()) {
+        // Writing to a String can't fail.
+        let _ = writeln!(
+            text,
+            "  {:24} {:>9} {:>9} {:>6} {:>7} {:>6} {:>7}",
+            "", "rmse", "relMSE", "PSNR", "FLIP", "ΔE2000", "masked"
+        );
+    }
+    for ((file, fit), compared) in rows {
+        let label = format!("{file} ({})", fit.model());
+        match compared {
+            Some(c) => text.push_str(&row(&label, c)),
+            None => {
+                let of_fit =
+                    fit.fit.as_ref().map_or(String::new(), |f| format!(", rmse {:.2e} over the readings", f.rmse));
+                let _ = writeln!(text, "  {label}: rendered alone{of_fit}");
+            }
+        }
+    }
+    text
 }
 
 /// The numbers of one fit, and what they mean.
@@ -127,16 +208,9 @@ fn label(file: &str, material: &Material, fits: usize) -> String {
 }
 
 /// The `k`-th picture; each has a seed of its own, so that their errors are independent.
-fn take(
-    k: usize,
-    label: String,
-    subject: Subject,
-    stage: &Stage,
-    options: &Options,
-    ui: &Ui,
-) -> Result<Shown, Failure> {
+fn take(k: usize, subject: Rendered, stage: &Stage, options: &Options, ui: &Ui) -> Result<Shown, Failure> {
     let options = Options { seed: options.seed.wrapping_add(k as u64), ..*options };
-    let image = chain::picture(stage, Some(subject), &options, ui.control())?;
-    let file = if k == 0 { "table".into() } else { format!("fit-{k}") };
-    Ok(Shown { file, difference_file: format!("difference-{k}"), label, image })
+    let Rendered { file, difference_file, label, material } = subject;
+    let image = chain::picture(stage, Some(material), &options, ui.control())?;
+    Ok(Shown { file, difference_file, label, image })
 }

@@ -42,10 +42,40 @@ fn in_plane_one_dimensional_and_flat_measurements_are_refused_for_rendering_with
         assert!(ran.err.contains(says), "{material}: {}", ran.err);
         assert!(!b.path("x.exr").exists(), "{material}");
     }
-    let refused = b.run(&["validate", "plane.csv", "plane.json", "--size", "16", "--samples", "2", "--out", "v"]);
-    assert_eq!(refused.code, Some(2));
-    assert!(refused.err.contains("plane of incidence"), "{}", refused.err);
+    let refused = b.run(&["validate", &flat, "flat.json", "--size", "16", "--samples", "2", "--out", "v"]);
+    assert!(refused.code == Some(2) && refused.err.contains("flat-world"), "{}", refused.err);
+    assert!(!b.path("v").exists());
     assert_eq!(b.picture("fit.exr", &["--material", "plane.json"]).code, Some(0), "its fit is of space");
+}
+
+/// A table that can't be rendered, in plane or planned, is no dead end: its fits are, and what is missing is said.
+#[test]
+fn validate_shows_the_fits_alone_where_the_table_does_not_cover_enough() {
+    let b = Bench::new();
+    b.ok(&["simulate", "--material", "satin", "--scan", "in-plane:5", "--out", "plane.csv"]);
+    b.ok(&["plan", "--budget", "5min", "--out", "scan.csv"]);
+    b.ok(&["simulate", "--material", "satin", "--scan", "list:scan.csv", "--out", "planned.csv"]);
+    for (table, why) in [("plane.csv", "lie in the plane of incidence"), ("planned.csv", "hemisphere")] {
+        for (model, out) in [("lambert", "a.json"), ("lambert+phong", "b.json")] {
+            b.ok(&["fit", table, "--model", model, "--out", out]);
+        }
+        let out = format!("{table}.d");
+        let both = ["validate", table, "a.json", "b.json", "--size", "16", "--samples", "16", "--out", &out];
+        let ran = b.ok(&[&both[..], &["--json"]].concat());
+        for says in ["can't be rendered", why, "each compared with the first", "measure the hemisphere"] {
+            assert!(ran.err.contains(says), "{says}: {}", ran.err);
+        }
+        let said = ran.json();
+        assert_eq!(said["reference"], "fit-1.exr");
+        assert!(said["table_not_rendered"].as_str().is_some_and(|reason| reason.contains(why)), "{said}");
+        assert!(said["fits"][0]["image"].is_null() && said["fits"][1]["image"]["rmse"].as_f64() > Some(0.0), "{said}");
+        let names = ["difference-2.exr", "difference-2.png", "fit-1.exr", "fit-1.png", "fit-2.exr", "fit-2.png"];
+        assert_eq!(b.list(&out), [&names[..], &["maps-2.png", "numbers.json", "sheet.png"]].concat());
+        let one = ["validate", table, "b.json", "--size", "16", "--samples", "2", "--out", "one"];
+        let ran = b.ok(&one);
+        assert!(ran.err.contains("of the fit alone") && ran.text().contains("rendered alone"), "{ran:?}");
+        assert!(b.path("one/fit-1.exr").is_file() && !b.path("one/table.exr").exists());
+    }
 }
 
 #[test]
