@@ -103,6 +103,8 @@ struct Table {
     scans: Vec<(String, Precision, f64)>,
     plan: Plan,
     budget_h: f64,
+    /// Readings of a row as the instrument has them.
+    own: u32,
 }
 
 impl Table {
@@ -120,12 +122,24 @@ impl Table {
         });
         let scans = scans.collect();
         let names = prior.names().into_iter().map(str::to_owned).collect();
-        Self { names, scans, plan, budget_h }
+        Self { names, scans, plan, budget_h, own: instrument.readings }
+    }
+
+    /// What a row stands for where it is more than the instrument's own readings.
+    fn longer(&self) -> Option<String> {
+        let (readings, own) = (self.plan.readings, self.own);
+        (readings > own).then(|| {
+            format!(
+                "each row is {readings} readings, instrument.readings = {readings} (simulate --readings {readings}): with {own} the budget pays for \
+                 more rows than a scan may have"
+            )
+        })
     }
 
     /// The scan as a file.
     fn scan(&self) -> String {
         let mut text = String::from("# goniofit plan, equal rows in a row are one stop\n");
+        text.extend(self.longer().map(|said| format!("# {said}\n")));
         text.push_str("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg\n");
         for &row in &self.plan.rows {
             let (wi, wo) = self.plan.directions.pair(row as usize);
@@ -140,13 +154,15 @@ impl Table {
         let of = &self.plan.precision;
         let pairs = self.plan.directions.len();
         let mut text = format!(
-            "{}: {pairs} pairs of directions, {} stops, {} readings, {} h of {} h\n\n",
+            "{}: {pairs} pairs of directions, {} stops, {} readings, {} h of {} h\n",
             out.display(),
             of.stops,
-            of.rows,
+            of.rows as f64 * f64::from(self.plan.readings) / f64::from(self.own),
             significant(of.hours),
             significant(self.budget_h)
         );
+        text.extend(self.longer().map(|said| said + "\n"));
+        text.push('\n');
         let heads: Vec<String> = self.names.iter().map(|n| format!("{n:>24}")).collect();
         // Writing to a String can't fail.
         let _ = writeln!(text, "{:14}{:>9}{:>9}{:>12}{}", "scan", "stops", "hours", "efficiency", heads.join(""));
@@ -184,7 +200,7 @@ impl Table {
         let scans: Vec<Value> = self.scans.iter().map(scan).collect();
         json!({
             "out": out, "pairs": self.plan.directions.len(), "budget_hours": self.budget_h, "quantiles": QUANTILES,
-            "undetermined": self.plan.undetermined, "draws": self.plan.draws, "scans": scans,
+            "undetermined": self.plan.undetermined, "readings_a_row": self.plan.readings, "draws": self.plan.draws, "scans": scans,
         })
     }
 }

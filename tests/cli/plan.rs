@@ -90,6 +90,24 @@ fn the_same_plan_whatever_the_threads_and_a_table_for_people() {
     }
 }
 
+/// Readings of a millisecond: two hours are more rows than a scan may have, so each row is several readings, and that is said.
+#[test]
+fn short_readings_are_joined_where_a_budget_pays_for_too_many_rows() {
+    let b = Bench::new();
+    let args = ["plan", "--budget", "2h", "--instrument", "robot", "--out", "scan.csv"];
+    let ran = b.ok(&args);
+    let said = b.json(&args);
+    let (plan, readings) = (&said["scans"][0], number(&said["readings_a_row"]));
+    let hours = number(&plan["hours"]);
+    assert!(hours <= 2.0 && hours > 1.95, "{hours}");
+    let rows = number(&plan["readings"]);
+    // Visits apart, 7.2 million milliseconds.
+    assert!(rows <= 1e6 && (7e6..=7.2e6).contains(&(rows * readings)), "{rows} rows of {readings}");
+    let says =
+        format!("each row is {readings} readings, instrument.readings = {readings} (simulate --readings {readings})");
+    assert!(ran.text().contains(&says) && b.text("scan.csv").contains(&says), "{}", ran.text());
+}
+
 /// A sharper prior asks for readings closer to the mirror direction.
 #[test]
 fn the_prior_decides_where_to_measure() {
@@ -119,7 +137,7 @@ fn what_can_t_be_planned_is_said() {
         (&["--budget", "soon"], "2h or 30min"),
         (&["--budget", "20s", "--instrument", "lab.toml"], "the least that is needed"),
         (&["--budget", "2s"], "the least that is needed"),
-        (&["--budget", "9999h"], "readings"),
+        (&["--budget", "9999999999999h"], "rows of readings"),
         (&["--budget", "1h", "--instrument", "dark.toml"], "instrument.electrons"),
         (&["--budget", "1h", "--prior", "phong[1].exponent=1..2"], "phong[1].exponent"),
         (&["--budget", "1h", "--prior", "phong.exponent=0..2"], "0 < LOW"),

@@ -32,6 +32,8 @@ pub struct Plan {
     pub directions: Directions,
     /// The order in which they are read, and how often: equal ones in a row are one stop.
     pub rows: Vec<u32>,
+    /// Readings that each row stands for: more than the instrument's own where rows would be too many.
+    pub readings: u32,
     /// What it costs and tells.
     pub precision: Precision,
     /// Mean ln det of the information that the best shares of the time give a second, whatever the moves: at least this much less `gap` is best.
@@ -53,40 +55,87 @@ const LEAST_SHARE: f64 = 0.01;
 /// Step of the usual scan that is tried beside, degrees.
 const EVEN_DEG: f64 = 5.0;
 
-/// Proposes where to measure.
+/// Proposes where to measure. Where a row of the instrument's own readings is so short that the budget pays for more rows than a scan may have, each row
+/// is several times as many readings.
 ///
 /// # Errors
 /// [`Wrong`]: a detector without noise, a prior that no scan tells, a budget that is too small or too large.
 pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
-    let Wish { prior, instrument, .. } = *wish;
-    if !instrument.is_noisy() {
+    if !wish.instrument.is_noisy() {
         return Err(Wrong::Noiseless);
     }
-    let pairs = candidates::pairs(prior.sharpest(), instrument);
-    let draws = prior.planned_for();
-    let usual_s = usual_move_s(instrument, &pairs);
-    let (stops, mut table) = tell(prior, instrument, usual_s, &pairs, &draws);
-    let open = || Wrong::Undetermined(prior.model().clone());
-    let undetermined = table.drop_undetermined();
-    let optimum = if table.draws.is_empty() { None } else { best(&table) }.ok_or_else(open)?;
-    let (kept, weights) = supported(&table, &optimum, affordable(wish, usual_s));
-    let share = |(&x, weight): (&usize, &f64)| Share { weight: *weight, ..stops[x] };
-    let chosen: Vec<(Pair, Share)> = kept.iter().zip(&weights).map(|of| (pairs[*of.0], share(of))).collect();
-    let even = even_grid(wish, usual_s, &draws);
-    // By noise alone the first is best; by what readings share another may be.
-    let others = [mirrored(&chosen, instrument), even].into_iter().filter_map(|list| whole(list, wish).ok());
-    let first = whole(chosen, wish)?;
-    let Scanned { directions, rows, precision } =
-        others.fold(first, |best, other| if other.sureness() > best.sureness() { other } else { best });
+    let draws = wish.prior.planned_for();
+    let weighed = Weighed::new(wish, &draws)?;
+    let mut times = 1;
+    let mut scanned = weighed.scanned(wish, &draws);
+    while let Err(Wrong::TooMany { found, most }) = scanned {
+        times = longer(wish.instrument, times, found / most).ok_or(Wrong::TooMany { found, most })?;
+        let instrument = &repeating(wish.instrument, times);
+        let wish = Wish { instrument, ..wish.clone() };
+        scanned = Weighed::new(&wish, &draws)?.scanned(&wish, &draws);
+    }
+    let Scanned { directions, rows, precision } = scanned?;
     Ok(Plan {
         precision,
         directions,
         rows,
-        best_a_second: optimum.mean_ln_det,
-        gap: optimum.gap,
-        undetermined,
+        readings: repeating(wish.instrument, times).readings,
+        best_a_second: weighed.optimum.mean_ln_det,
+        gap: weighed.optimum.gap,
+        undetermined: weighed.undetermined,
         draws: draws.len(),
     })
+}
+
+/// The instrument that reads so many times as often in each row.
+fn repeating(instrument: &Instrument, times: u32) -> Instrument {
+    Instrument { readings: instrument.readings.saturating_mul(times), ..instrument.clone() }
+}
+
+/// How many times as many readings a row must be where `times` leave so many times too many rows; `None` beyond what can be counted.
+fn longer(instrument: &Instrument, times: u32, too_many: f64) -> Option<u32> {
+    let longer = (f64::from(times) * too_many).ceil().max(f64::from(times) + 1.0);
+    (longer * f64::from(instrument.readings) <= f64::from(u32::MAX)).then_some(longer as u32)
+}
+
+/// Candidates, and the shares of the time that are best.
+struct Weighed {
+    pairs: Vec<Pair>,
+    usual_s: f64,
+    stops: Vec<Share>,
+    table: Table,
+    optimum: Optimum,
+    undetermined: usize,
+}
+
+impl Weighed {
+    fn new(wish: &Wish<'_>, draws: &[Vec<f64>]) -> Result<Self, Wrong> {
+        let Wish { prior, instrument, .. } = *wish;
+        let pairs = candidates::pairs(prior.sharpest(), instrument);
+        let usual_s = usual_move_s(instrument, &pairs);
+        let (stops, mut table) = tell(prior, instrument, usual_s, &pairs, draws);
+        let open = || Wrong::Undetermined(prior.model().clone());
+        let undetermined = table.drop_undetermined();
+        let optimum = if table.draws.is_empty() { None } else { best(&table) }.ok_or_else(open)?;
+        Ok(Self { pairs, usual_s, stops, table, optimum, undetermined })
+    }
+
+    /// The surest scan: by noise alone the first is best; by what readings share another may be.
+    fn scanned(&self, wish: &Wish<'_>, draws: &[Vec<f64>]) -> Result<Scanned, Wrong> {
+        let (kept, weights) = supported(&self.table, &self.optimum, affordable(wish, self.usual_s));
+        let share = |(&x, weight): (&usize, &f64)| Share { weight: *weight, ..self.stops[x] };
+        let chosen: Vec<(Pair, Share)> = kept.iter().zip(&weights).map(|of| (self.pairs[*of.0], share(of))).collect();
+        let others = [mirrored(&chosen, wish.instrument), even_grid(wish, self.usual_s, draws)];
+        let mut best = whole(chosen, wish)?;
+        for list in others {
+            match whole(list, wish) {
+                Ok(other) if other.sureness() > best.sureness() => best = other,
+                Err(wrong @ Wrong::TooMany { .. }) => return Err(wrong),
+                _ => {}
+            }
+        }
+        Ok(best)
+    }
 }
 
 /// Whole readings.

@@ -69,9 +69,9 @@ pub enum Wrong {
         /// Seconds that there are.
         found_s: f64,
     },
-    /// More readings than a scan may have.
+    /// More rows than a scan may have, however many readings each is.
     #[error(
-        "budget: it pays for {found:e} readings; expected at most {most:e}: let each take longer (instrument.readings, detector.exposures_s)"
+        "budget: it pays for {found:e} rows of readings; expected at most {most:e}: let each take longer (instrument.detector.exposures_s)"
     )]
     TooMany {
         /// How many it pays for.

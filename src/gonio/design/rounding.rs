@@ -1,5 +1,8 @@
 //! Shares of the time to whole readings that a budget pays for, moves and visits included, in an order that keeps moves few.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use super::prior::Wrong;
 use crate::gonio::cost::{seconds_of, visit_s};
 use crate::gonio::instrument::Instrument;
@@ -74,18 +77,17 @@ fn in_order(shares: &[Share], time_s: f64) -> Vec<u32> {
 /// Each index as often as `left` says, none twice in a row while another is left: two stops in a row at one pair would be one, of one jitter. Next
 /// comes whichever has most left, the first of equals.
 fn alternating(left: &[u32]) -> Vec<usize> {
-    let mut left = left.to_vec();
-    let mut order: Vec<usize> = Vec::new();
-    loop {
-        let last = order.last().copied();
-        let others = (0..left.len()).filter(|x| left[*x] > 0 && Some(*x) != last);
-        let Some(next) = others.max_by_key(|x| (left[*x], std::cmp::Reverse(*x))).or(last.filter(|x| left[*x] > 0))
-        else {
-            return order;
-        };
-        left[next] -= 1;
-        order.push(next);
+    let mut others: BinaryHeap<(u32, Reverse<usize>)> =
+        left.iter().enumerate().filter(|(_, n)| **n > 0).map(|(x, n)| (*n, Reverse(x))).collect();
+    let mut order: Vec<usize> = Vec::with_capacity(left.iter().map(|n| *n as usize).sum());
+    // The one that came last waits until another has come.
+    let mut last: Option<(u32, Reverse<usize>)> = None;
+    while let Some((n, x)) = others.pop().or_else(|| last.take()) {
+        order.push(x.0);
+        others.extend(last.take());
+        last = Some((n - 1, x)).filter(|(n, _)| *n > 0);
     }
+    order
 }
 
 #[cfg(test)]
