@@ -60,7 +60,7 @@ fn read(instrument: &Instrument, left_out: &[&str]) -> (usize, f64) {
     let (directions, weights) = Scan::Hemisphere { step_deg: 5.0 }.directions().expect("small");
     let (truth, channels, dimension) = (&truth, &of.channels[..], Dimension::Space);
     let (directions, weights, seed, accuracy) = (&directions, &weights, 1, 1e-6);
-    let job = Job { truth, channels, instrument, dimension, directions, weights, rows: &[], seed, accuracy, left_out };
+    let job = Job { truth, lobes: None, channels, instrument, dimension, directions, weights, rows: &[], seed, accuracy, left_out };
     let clock = Instant::now();
     let raw = black_box(job.run(Control::silent()));
     (raw.readings.len(), clock.elapsed().as_secs_f64())

@@ -91,12 +91,16 @@ pub fn with_job<T>(
     if let Scan::Adaptive { pairs } = scan {
         within(instrument, *pairs as usize)?;
     }
+    let lobes = match source {
+        Source::Fitted(material) => Some(&**material),
+        Source::Measured(_) => None,
+    };
     with_truth(name, source, scan, |truth, channels| {
         let (accuracy, left_out) = (ACCURACY, &[][..]);
         let look = |scan: &Scan, control: Control<'_>| {
             let (directions, weights) = &scan.directions()?;
             let (dimension, rows) = (scan.dimension(), scan.rows());
-            Job { truth, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out }
+            Job { truth, lobes, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out }
                 .look(control)
         };
         let scan = chosen(scan, source, instrument, control, look);
@@ -107,6 +111,7 @@ pub fn with_job<T>(
         }
         Some(Ok(work(&Job {
             truth,
+            lobes,
             channels,
             instrument,
             dimension,

@@ -15,6 +15,7 @@ use super::reading::{Kind, Reading};
 use super::scan::kept_weights;
 use super::series::series;
 use super::simulate::Truth;
+use crate::brdf::Material;
 use crate::control::{Control, counted};
 use crate::measurement::{Dimension, Directions, STOPPED, Weights};
 use crate::numeric::sum::BLOCK;
@@ -23,6 +24,8 @@ use crate::numeric::sum::BLOCK;
 pub struct Job<'a> {
     /// What stands on the holder.
     pub truth: &'a Truth<'a>,
+    /// The same where it is a sum of lobes: means over wide cones are then known without sums over directions.
+    pub lobes: Option<&'a Material>,
     /// Names of its channels.
     pub channels: &'a [String],
     /// The instrument.
@@ -117,9 +120,9 @@ impl Job<'_> {
 
     /// What passes are made from.
     pub(super) fn maker<'b>(&'b self, actual: &'b Actual) -> Maker<'b> {
-        let Self { truth, channels, instrument, seed, accuracy, dimension, .. } = *self;
+        let Self { truth, lobes, channels, instrument, seed, accuracy, dimension, .. } = *self;
         let stop = Control::silent().stop;
-        Maker { instrument, dimension, channels, actual, truth, seed, accuracy, stop }
+        Maker { instrument, dimension, channels, actual, truth, lobes, seed, accuracy, stop }
     }
 
     /// Readings with these signals.

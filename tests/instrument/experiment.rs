@@ -95,6 +95,7 @@ impl Experiment {
         };
         work(&Job {
             truth: &truth,
+            lobes: None,
             channels: &self.seen.material.channels,
             instrument,
             dimension: Dimension::Space,

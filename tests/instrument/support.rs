@@ -92,6 +92,7 @@ pub fn with_job<T>(
     let dimension = if of.is_flat() { Dimension::Flat } else { Dimension::Space };
     work(&Job {
         truth: &truth,
+        lobes: None,
         channels,
         instrument,
         dimension,

@@ -9,9 +9,11 @@ use glam::DVec3;
 
 use super::cone::Cones;
 use super::{Block, Maker, Pass};
+use crate::brdf::{LobeTerm, Material};
 use crate::control::Stop;
 use crate::gonio::parts::Reference;
 use crate::gonio::reading::Kind;
+use crate::gonio::sight;
 use crate::gonio::simulate::Truth;
 use crate::measurement::Dimension;
 
@@ -29,7 +31,35 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     if source == 0.0 && detector == 0.0 {
         return Box::new(light);
     }
-    Box::new(Spread { light, cones: Cones::new(source, detector, maker.accuracy, maker.dimension), stop: maker.stop })
+    let cones = Cones::new(source, detector, maker.accuracy, maker.dimension);
+    Box::new(Spread { light, cones, lobes: Lobes::of(maker, (source, detector)), stop: maker.stop })
+}
+
+/// A truth that is a sum of lobes, of which means over both cones are known without a sum over directions.
+struct Lobes<'a> {
+    material: &'a Material,
+    cones: sight::Cones,
+    accuracy: f64,
+}
+
+impl<'a> Lobes<'a> {
+    /// `None` where sums are as quick, and in the flat world.
+    fn of(maker: &Maker<'a>, (source, detector): (f64, f64)) -> Option<Self> {
+        let material = maker.lobes.filter(|_| maker.dimension == Dimension::Space)?;
+        let cones = sight::Cones::new(source, detector)?;
+        let wide = |term: &LobeTerm, c: usize| {
+            term.shape_of(c).is_some_and(|shape| shape.first().is_some_and(|n| cones.are_wide_for(*n)))
+        };
+        let worth = material.lobes.iter().any(|term| (0..material.channels.len()).any(|c| wide(term, c)));
+        worth.then_some(Self { material, cones, accuracy: maker.accuracy })
+    }
+
+    /// Writes the mean of f·cosθo times `gain` where it is good enough, and returns its error.
+    fn mean(&self, wi: DVec3, wo: DVec3, gain: f64, out: &mut [f64]) -> Option<f64> {
+        let error = self.cones.write_flux(self.material, wi, wo, out).filter(|error| *error <= self.accuracy)?;
+        out.iter_mut().for_each(|value| *value *= gain);
+        Some(error)
+    }
 }
 
 /// The BRDF of the reference standard.
@@ -99,6 +129,7 @@ impl Pass for Light<'_> {
 struct Spread<'a> {
     light: Light<'a>,
     cones: Cones,
+    lobes: Option<Lobes<'a>>,
     stop: &'a Stop,
 }
 
@@ -118,7 +149,10 @@ impl Pass for Spread<'_> {
             // Repeats and exposures of one stop have the same mean.
             let here = Some((reading.kind, block.wi[i], block.wo[i]));
             if here != last {
-                let error = self.cones.mean(block.wi[i], block.wo[i], &mut add, &mut out);
+                let (wi, wo) = (block.wi[i], block.wo[i]);
+                let lobes = self.lobes.as_ref().filter(|_| reading.kind == Kind::Sample);
+                let known = lobes.and_then(|lobes| lobes.mean(wi, wo, gain, &mut out));
+                let error = known.unwrap_or_else(|| self.cones.mean(wi, wo, &mut add, &mut out));
                 block.error = block.error.max(error);
                 last = here;
             }

@@ -29,6 +29,7 @@ use super::actual::Actual;
 use super::instrument::Instrument;
 use super::reading::Reading;
 use super::simulate::Truth;
+use crate::brdf::Material;
 use crate::control::{Plan, Stop};
 use crate::measurement::Dimension;
 
@@ -81,6 +82,8 @@ pub(super) struct Maker<'a> {
     pub channels: &'a [String],
     pub actual: &'a Actual,
     pub truth: &'a Truth<'a>,
+    /// The truth where it is a sum of lobes.
+    pub lobes: Option<&'a Material>,
     pub seed: u64,
     /// Relative error that quadratures may have.
     pub accuracy: f64,
