@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Instructions of one simulation (callgrind): each effect left out by name against an instrument without its part; and, not judged, the ideal instrument
-# against a loop over f·cosθo, which makes no raw readings. Needs valgrind. Exits with 1 where two differ by more than 2 %.
+# Instructions of one simulation (callgrind): each effect left out by name against an instrument without its part, which makes the same readings; and, not
+# judged, the ideal instrument against a loop over f·cosθo, which makes no raw readings. Needs valgrind. Exits with 1 where two differ by more than 2 %.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=${1:-}
@@ -32,7 +32,8 @@ echo "|---|---|---|---|"
 compare "all, against a bare loop" "$(count ideal)" "$(count by-hand)"
 shift || true
 effects=("$@")
-[ ${#effects[@]} -gt 0 ] || effects=("axis zeros" "axis jitter" "sample tilt" "source divergence" "footprint" "shadow" "source drift" "nonlinearity" "read noise" "quantisation")
+[ ${#effects[@]} -gt 0 ] || effects=("axis zeros" "axis jitter" "sample tilt" "sample height" "source divergence" "detector aperture" "footprint" "shadow"
+  "stray light" "source drift" "dark current" "saturation" "nonlinearity" "read noise" "quantisation")
 for effect in "${effects[@]}"; do
   judge "$effect" "$(count left-out "$effect")" "$(count without "$effect")"
 done
