@@ -137,6 +137,25 @@ pub fn csv(rows: &[(f64, f64, f64, f64)]) -> String {
     text
 }
 
+/// A laboratory with a reference, two exposures, moves and a shadow; no errors of its own.
+pub const LAB: &str = "version = 1
+[instrument]
+electrons = 1e6
+[instrument.detector]
+full_well = 4e5
+exposures_s = [0.02, 0.5]
+[instrument.reference]
+reflectance = 0.985
+[instrument.axes]
+move_s = 2
+[instrument.surroundings]
+stray_per_sr = 2e-3
+shadow_deg = 3
+[instrument.protocol]
+block = 100
+repeats = 8
+";
+
 /// All its samples lie beyond the default angular limit.
 pub fn nothing_to_fit() -> String {
     csv(&[(30.0, 85.0, 0.0, 1.0), (30.0, 86.0, 0.0, 1.0)])
