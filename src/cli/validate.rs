@@ -173,14 +173,12 @@ fn text(rows: &[Row<'_>]) -> String {
     }
     for ((file, fit), compared) in rows {
         let label = format!("{file} ({})", fit.model());
-        match compared {
-            Some(c) => text.push_str(&row(&label, c)),
-            None => {
-                let of_fit =
-                    fit.fit.as_ref().map_or(String::new(), |f| format!(", rmse {:.2e} over the readings", f.rmse));
-                let _ = writeln!(text, "  {label}: rendered alone{of_fit}");
-            }
+        if let Some(c) = compared {
+            text.push_str(&row(&label, c));
+            continue;
         }
+        let of_fit = fit.fit.as_ref().map_or(String::new(), |f| format!(", rmse {:.2e} over the readings", f.rmse));
+        let _ = writeln!(text, "  {label}: rendered alone{of_fit}");
     }
     text
 }
