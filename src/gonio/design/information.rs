@@ -2,14 +2,17 @@
 
 use super::candidates::Pair;
 use super::prior::Prior;
-use crate::brdf::LobeKind;
 use crate::brdf::lobe::MAX_PARAMETERS;
-use crate::geometry::angles::turned;
+use crate::brdf::{LobeKind, MAX_LOBES};
 use crate::gonio::effects::footprint::Footprint;
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
+use crate::gonio::reduce::positions::Jitter;
 use crate::gonio::reduce::saturation_limit;
 use crate::measurement::Dimension;
+
+/// Most parameters of a model.
+const MOST: usize = MAX_LOBES * (1 + MAX_PARAMETERS);
 
 /// A model's value and its derivatives.
 pub(super) struct Model {
@@ -51,6 +54,7 @@ impl Model {
 pub(super) struct Noise<'a> {
     instrument: &'a Instrument,
     footprint: Option<Footprint>,
+    stops: Jitter<'a>,
     /// Read noise and rounding of one reading, electrons².
     fixed: f64,
 }
@@ -58,7 +62,8 @@ pub(super) struct Noise<'a> {
 impl<'a> Noise<'a> {
     pub fn of(instrument: &'a Instrument) -> Self {
         let fixed = instrument.read_noise.powi(2) + step(&instrument.detector).powi(2) / 12.0;
-        Self { instrument, footprint: Footprint::of(instrument, Dimension::Space), fixed }
+        let footprint = Footprint::of(instrument, Dimension::Space);
+        Self { instrument, footprint, stops: Jitter::of(instrument), fixed }
     }
 
     /// Variance of f from the readings of one row (all its repeats), by photons, dark current, stray light and electronics, in the longest exposure
@@ -81,26 +86,13 @@ impl<'a> Noise<'a> {
         Some(electrons / (f64::from(instrument.readings) * (rate * time).powi(2)))
     }
 
-    /// Variance of f by where four axes stop, the same for all readings of a stop: of each axis half the difference that ±σ makes, and what its square
-    /// does (as the reduction counts it).
-    pub fn jitter(&self, model: &Model, parameters: &[f64], f: f64, (wi, wo): Pair) -> f64 {
-        let sigma = self.instrument.axes.jitter_deg.to_radians();
-        if sigma == 0.0 {
-            return 0.0;
-        }
-        let mut unused = vec![0.0; model.parameters()];
-        let mut flux = |wi, wo: glam::DVec3| model.value(parameters, (wi, wo), &mut unused) * wo.z;
-        let mut of = |axis: usize, x: f64| match axis {
-            0 => flux(turned(wi, x, 0.0), wo),
-            1 => flux(turned(wi, 0.0, x), wo),
-            2 => flux(wi, turned(wo, x, 0.0)),
-            _ => flux(wi, turned(wo, 0.0, x)),
+    /// Variance of f by where four axes stop, the same for all readings of a stop, as the reduction counts it.
+    pub fn jitter(&self, model: &Model, parameters: &[f64], pair: Pair) -> f64 {
+        let truth = |wi, wo, out: &mut [f64]| {
+            out[0] = model.value(parameters, (wi, wo), &mut [0.0; MOST][..model.parameters()]);
+            true
         };
-        let mut variance = |axis: usize| {
-            let (up, down) = (of(axis, sigma) / wo.z, of(axis, -sigma) / wo.z);
-            (0.5 * (up - down)).powi(2) + 3.0 * (0.5 * (up + down) - f).powi(2)
-        };
-        (0..4).map(&mut variance).sum()
+        self.stops.variance(pair, &truth)
     }
 }
 
@@ -162,7 +154,7 @@ mod tests {
         let (noise, model, at) = (Noise::of(&instrument), model("lambert+phong"), [0.3, 0.1, 100.0]);
         let of = |pair: Pair| {
             let f = model.value(&at, pair, &mut [0.0; 3]);
-            (noise.jitter(&model, &at, f, pair).sqrt(), f)
+            (noise.jitter(&model, &at, pair).sqrt(), f)
         };
         let (flank, f) = of(pair(30.0, 35.0));
         let sigma = 0.1f64.to_radians();

@@ -241,7 +241,7 @@ fn tell(
             .iter()
             .map(|draw| {
                 let f = model.value(draw, *pair, &mut gradient);
-                (f, noise.variance(f, *pair), noise.jitter(&model, draw, f, *pair))
+                (f, noise.variance(f, *pair), noise.jitter(&model, draw, *pair))
             })
             .collect();
         let stop =

@@ -126,7 +126,7 @@ fn at(model: &Model, (noise, kept): (&Noise<'_>, &Kept<'_>), draw: &[f64], pairs
     for (pair, stops) in pairs {
         let f = model.value(draw, *pair, &mut gradient);
         let Some(own) = noise.variance(f, *pair) else { continue };
-        let jitter = noise.jitter(model, draw, f, *pair);
+        let jitter = noise.jitter(model, draw, *pair);
         let weight: f64 = stops.iter().map(|rows| 1.0 / (own / *rows as f64 + jitter)).sum();
         for (k, u) in kept.components(*pair, f, &truth).into_iter().enumerate() {
             (0..p).for_each(|a| shared[(a, k)] += weight * gradient[a] * u);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::bend::{self, Bend};
-use super::positions::{Off, Optics};
+use super::positions::{Off, Optics, net};
 use super::shared::{JITTER, Shared};
 use super::spread::{self, Heights};
 use crate::gonio::simulate::Truth;
@@ -61,12 +61,12 @@ pub(super) fn effects(
     let scale = optics.scale(pair);
     let (_, list) = optics.moved(pair, errors, model, values.len());
     let part = |c: usize, value: f64, k: usize| {
-        let ((u, q), (of_u, of_q)) = (list[k][c], reference[k]);
-        if errors[k].0 == JITTER {
-            // What moves is divided by the stops, and so is the scatter of what bends, but not its mean.
-            return (scale * u / stops.sqrt(), scale * q * ((2.0 / stops + 1.0) / 3.0).sqrt());
+        let (u, q) = net(scale, value, list[k][c], reference[k]);
+        if errors[k].0 != JITTER {
+            return (u, q);
         }
-        (scale * u - value * of_u, scale * q - value * of_q)
+        // What moves is divided by the stops, and so is the scatter of what bends, but not its mean.
+        (u / stops.sqrt(), q * ((2.0 / stops + 1.0) / 3.0).sqrt())
     };
     let parts = |(c, value): (usize, &f64)| (0..errors.len()).map(|k| part(c, *value, k)).collect();
     let mut effects: Vec<Effect> =

@@ -165,11 +165,42 @@ impl<'a> Optics<'a> {
     }
 }
 
+/// What an error does to a reading of this value, 1/sr: u and q of the flux at `scale`, less what it does to the reference, which the reading is divided by.
+pub(super) fn net(scale: f64, value: f64, of: (f64, f64), of_reference: (f64, f64)) -> (f64, f64) {
+    (scale * of.0 - value * of_reference.0, scale * of.1 - value * of_reference.1)
+}
+
+/// The errors of where axes stop, new at each.
+fn jitter(instrument: &Instrument, dimension: Dimension) -> Vec<Off> {
+    errors(instrument, dimension).into_iter().filter(|(family, _, _)| *family == JITTER).collect()
+}
+
+/// Where axes stop, as a source of noise that all readings of a stop share.
+pub(in crate::gonio) struct Jitter<'a> {
+    optics: Optics<'a>,
+    errors: Vec<Off>,
+}
+
+impl<'a> Jitter<'a> {
+    pub fn of(instrument: &'a Instrument) -> Self {
+        let dimension = Dimension::Space;
+        Self { optics: Optics::new(instrument, dimension), errors: jitter(instrument, dimension) }
+    }
+
+    /// Variance of what is read of `model` at a pair of directions, 1/sr².
+    pub fn variance(&self, pair: (DVec3, DVec3), model: &Truth<'_>) -> f64 {
+        if self.errors.is_empty() {
+            return 0.0;
+        }
+        let scale = self.optics.scale(pair);
+        let (_, list) = self.optics.moved(pair, &self.errors, model, 1);
+        list.iter().map(|of| (scale * of[0].0).powi(2) + 3.0 * (scale * of[0].1).powi(2)).sum()
+    }
+}
+
 /// Relative σ of the reference's reading by where the axes stop.
 pub(super) fn of_reference(instrument: &Instrument, dimension: Dimension) -> f64 {
-    let jitter: Vec<Off> =
-        errors(instrument, dimension).into_iter().filter(|(family, _, _)| *family == JITTER).collect();
-    let list = Optics::new(instrument, dimension).of_reference(&jitter);
+    let list = Optics::new(instrument, dimension).of_reference(&jitter(instrument, dimension));
     list.iter().map(|(u, q)| u * u + 3.0 * q * q).sum::<f64>().sqrt()
 }
 
@@ -194,9 +225,9 @@ impl<'a> Kept<'a> {
         let scale = self.optics.scale(pair);
         let (_, list) = self.optics.moved(pair, &self.errors, model, 1);
         let certificate = f * self.optics.instrument.reference.reflectance_u;
-        let of_positions = list.iter().zip(&self.reference).flat_map(|(of, (of_u, of_q))| {
-            let (u, q) = of[0];
-            [scale * u - f * of_u, 3f64.sqrt() * (scale * q - f * of_q)]
+        let of_positions = list.iter().zip(&self.reference).flat_map(|(of, of_reference)| {
+            let (u, q) = net(scale, f, of[0], *of_reference);
+            [u, 3f64.sqrt() * q]
         });
         of_positions.chain([certificate]).collect()
     }
