@@ -2,12 +2,14 @@
 
 use std::time::{Duration, Instant};
 
+use super::effects;
 use super::forward::Job;
 use crate::control::Control;
 use crate::numeric::sum::BLOCK;
 
-/// Readings that are tried.
+/// Readings that are tried, and those before that make what all readings share: tables of lobes through cones.
 const TRIED: usize = 256;
+const BEFORE: usize = 8;
 /// Share of the time that trials may take.
 const TRIALS: f64 = 0.2;
 /// Accuracies that are tried, each a step finer; the first takes the lowest orders that there are.
@@ -35,6 +37,10 @@ impl Job<'_> {
         let (readings, actual) = self.prepare();
         let every = readings.len().div_ceil(TRIED).max(1);
         let some: Vec<_> = readings.iter().step_by(every).copied().collect();
+        let first: Vec<_> = some.iter().step_by(some.len().div_ceil(BEFORE).max(1)).copied().collect();
+        // Tables that passes share are kept as long as any pass is; what comes of these readings is not wanted.
+        let kept = effects::passes(&self.maker(&actual), self.left_out);
+        let _ = Job { accuracy: COARSEST, ..*self }.read(first, &actual, Control::silent());
         let predict = |accuracy: f64| {
             let trial = Job { accuracy, ..*self };
             let start = Instant::now();
@@ -53,6 +59,7 @@ impl Job<'_> {
             best = Affordable { accuracy, predicted_s, fits: true };
             accuracy *= STEP;
         }
+        drop(kept);
         best
     }
 }

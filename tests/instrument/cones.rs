@@ -212,3 +212,23 @@ fn a_mirror_like_material_is_read_through_wide_cones_to_what_is_asked_for() {
     let raw = chain::measure_raw("m", &source, &classroom, &scan, 1, Control::silent()).expect("read");
     assert!(raw.quadrature_error > 0.0 && raw.quadrature_error <= ACCURACY, "{:e}", raw.quadrature_error);
 }
+
+/// Tables of lobes are made once: the time that is predicted for many readings is not that of the tables times the readings.
+#[test]
+fn the_time_of_readings_is_told_without_what_is_made_once() {
+    let instrument = Instrument {
+        source: Source { divergence_deg: 3.1, ..Source::default() },
+        detector: Detector { aperture_deg: 5.3, ..Detector::default() },
+        ..Instrument::noiseless()
+    };
+    let (of, scan) = (material(0.1, 0.2, 2.3e4), in_plane(0.1));
+    let (affordable, seconds) = with_job(&of, &instrument, &scan, 0, &[], |job| {
+        let job = Job { lobes: Some(&of), ..*job };
+        let affordable = job.affordable(std::time::Duration::from_secs(2));
+        let clock = std::time::Instant::now();
+        let _ = Job { accuracy: affordable.accuracy, ..job }.run(Control::silent());
+        (affordable, clock.elapsed().as_secs_f64())
+    });
+    println!("predicted {} s, took {seconds} s", affordable.predicted_s);
+    assert!(affordable.predicted_s < 0.1 + 5.0 * seconds, "{affordable:?} {seconds}");
+}

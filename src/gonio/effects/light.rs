@@ -54,11 +54,20 @@ impl<'a> Lobes<'a> {
         worth.then_some(Self { material, cones, accuracy: maker.accuracy })
     }
 
-    /// Writes the mean of f·cosθo times `gain` where it is good enough, and returns its error.
-    fn mean(&self, wi: DVec3, wo: DVec3, gain: f64, out: &mut [f64]) -> Option<f64> {
-        let error = self.cones.write_flux(self.material, wi, wo, out).filter(|error| *error <= self.accuracy)?;
+    /// Writes the mean of f·cosθo times `gain` where it is known, and returns its error; that of `sum` where it is not as good as is asked for, and the sum is
+    /// better.
+    fn mean(&self, wi: DVec3, wo: DVec3, gain: f64, out: &mut [f64], mut sum: impl FnMut(&mut [f64]) -> f64) -> f64 {
+        let Some(error) = self.cones.write_flux(self.material, wi, wo, out) else { return sum(out) };
         out.iter_mut().for_each(|value| *value *= gain);
-        Some(error)
+        if error <= self.accuracy {
+            return error;
+        }
+        let mut summed = vec![0.0; out.len()];
+        let of_sum = sum(&mut summed);
+        if of_sum < error {
+            out.copy_from_slice(&summed);
+        }
+        error.min(of_sum)
     }
 }
 
@@ -150,9 +159,12 @@ impl Pass for Spread<'_> {
             let here = Some((reading.kind, block.wi[i], block.wo[i]));
             if here != last {
                 let (wi, wo) = (block.wi[i], block.wo[i]);
+                let mut sum = |out: &mut [f64]| self.cones.mean(wi, wo, &mut add, out);
                 let lobes = self.lobes.as_ref().filter(|_| reading.kind == Kind::Sample);
-                let known = lobes.and_then(|lobes| lobes.mean(wi, wo, gain, &mut out));
-                let error = known.unwrap_or_else(|| self.cones.mean(wi, wo, &mut add, &mut out));
+                let error = match lobes {
+                    Some(lobes) => lobes.mean(wi, wo, gain, &mut out, sum),
+                    None => sum(&mut out),
+                };
                 block.error = block.error.max(error);
                 last = here;
             }

@@ -35,18 +35,26 @@ pub(super) struct Tables {
     recent: Mutex<Vec<(u64, Arc<Seen>)>>,
 }
 
+/// Tables that somebody holds, and those that were asked for last.
+struct Held {
+    all: Vec<Weak<Tables>>,
+    last: Option<Arc<Tables>>,
+}
+
 impl Tables {
-    /// Those for these discs, one of which is wider than a point at least; the same ones as long as somebody holds them.
+    /// Those for these discs, one of which is wider than a point at least; the same ones as long as somebody holds them, or nobody has asked for others:
+    /// readings and the fit that reduces them have the same cones.
     pub fn of(source: Disc, detector: Disc) -> Arc<Self> {
-        static HELD: Mutex<Vec<Weak<Tables>>> = Mutex::new(Vec::new());
-        let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+        static HELD: Mutex<Held> = Mutex::new(Held { all: Vec::new(), last: None });
+        let Held { all: held, last } = &mut *HELD.lock().unwrap_or_else(PoisonError::into_inner);
         held.retain(|tables| tables.strong_count() > 0);
         let same = |tables: &Arc<Self>| tables.source == source && tables.detector == detector;
-        if let Some(tables) = held.iter().filter_map(Weak::upgrade).find(same) {
-            return tables;
-        }
-        let tables = Arc::new(Self { source, detector, octaves: Mutex::default(), recent: Mutex::default() });
-        held.push(Arc::downgrade(&tables));
+        let tables = held.iter().filter_map(Weak::upgrade).find(same).unwrap_or_else(|| {
+            let made = Arc::new(Self { source, detector, octaves: Mutex::default(), recent: Mutex::default() });
+            held.push(Arc::downgrade(&made));
+            made
+        });
+        *last = Some(Arc::clone(&tables));
         tables
     }
 
