@@ -280,3 +280,14 @@ fn reducing_the_raw_file_gives_what_simulate_writes_to_the_byte() {
         assert!(b.bytes("m.csv") == b.bytes("plain.csv"), "{instrument}, {scan}");
     }
 }
+
+#[test]
+fn a_reference_that_is_described_but_was_not_read_is_said_to_be_missing() {
+    let b = Bench::new();
+    let rows = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,kind,time_s,exposure_s,repeat,signal_y\n0,0,45,0,sample,0,1,0,100\n";
+    b.write("log.csv", rows);
+    let ran = b.run(&["reduce", "log.csv", "--instrument", "commercial", "--out", "m.csv"]);
+    for says in ["log.csv", "instrument.reference.reflectance = ", "no reading of it is there", "kind `reference`"] {
+        assert!(ran.code == Some(2) && ran.err.contains(says), "{ran:?}");
+    }
+}

@@ -72,3 +72,54 @@ fn a_real_log_is_reduced_by_its_own_blanks() {
     // The stops at 30° read 112 and 115 over a blank of 11.
     assert!((a - (0.5 * (112.0 + 115.0) - 11.0)).abs() < 1e-12 && (b - 50.0).abs() < 1e-12, "{a} {b}");
 }
+
+/// A log that goes through its exposures again and again: all repeats of the longest that does not saturate count, wherever they stand.
+#[test]
+fn repeats_count_whatever_the_order_of_exposures() {
+    let rows = |order: &[(f64, f64)]| -> String {
+        let row =
+            |(i, (exposure, signal)): (usize, &(f64, f64))| format!("0,0,60,0,sample,{i},{exposure},0,{signal}\n");
+        order.iter().enumerate().map(row).collect()
+    };
+    let detector = goniofit::gonio::parts::Detector { full_well: 500.0, ..Default::default() };
+    let instrument = Instrument { electrons: 100.0, read_noise: 0.0, detector, ..Instrument::default() };
+    let reduced = |order: &[(f64, f64)]| {
+        let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}{}", rows(order))).expect("valid");
+        let m = goniofit::gonio::reduce("m", &raw, &instrument, None).expect("reduced").measurement;
+        (m.value(0, 0).expect("valid"), m.sigma.expect("noise")[0])
+    };
+    let blocks = reduced(&[(0.1, 9.0), (0.1, 11.0), (1.0, 90.0), (1.0, 110.0), (9.0, 500.0), (9.0, 500.0)]);
+    let cycled = reduced(&[(0.1, 9.0), (1.0, 90.0), (9.0, 500.0), (0.1, 11.0), (1.0, 110.0), (9.0, 500.0)]);
+    assert_eq!(blocks, cycled);
+    // 100 a second of 50 at cosθo = ½, by two readings of shot noise 10.
+    assert!((cycled.0 - 2.0).abs() < 1e-12 && (cycled.1 - 0.2 / f64::sqrt(2.0)).abs() < 1e-12, "{cycled:?}");
+}
+
+/// Without a reference nothing tells how far the source's power has walked. Two readings differ by what it walked between them, and not by less because
+/// both are off by what it walked before: σ² of their ratio is that of the time between.
+#[test]
+fn a_walk_that_no_reference_tells_is_shared_as_far_as_it_is() {
+    let base = Instrument { electrons: 1e15, read_noise: 0.0, ..Instrument::default() };
+    let drifting = goniofit::gonio::parts::Source { drift_per_sqrt_hour: 0.01, ..base.source };
+    let detector = goniofit::gonio::parts::Detector { exposures_s: vec![36.0], ..Default::default() };
+    let instrument = Instrument { source: drifting, detector, ..base };
+    let (of, scan) = (material(0.3, 0.0, 1.0), in_plane(10.0));
+    let raw = read(&of, &instrument, &scan, 1);
+    let m = reduced(&raw, &instrument, &of).measurement;
+    let sigma = m.sigma.as_ref().expect("noise");
+    // Readings of 36 s: place i is 0.01 (i + ½) hours from the start.
+    let hours = |i: usize| 0.01 * (i as f64 + 0.5);
+    let relative = |plane: &[f64], i: usize| plane[i] / m.value(0, i).expect("valid");
+    let last = m.len() - 1;
+    for (i, j) in [(0, last), (3, 60), (40, 80), (50, 60), (last - 9, last)] {
+        let alone = m.common.iter().map(|plane| relative(plane, j).powi(2)).sum::<f64>() + relative(sigma, j).powi(2);
+        assert!((alone / (1e-4 * hours(j)) - 1.0).abs() < 1e-9, "{j}: {alone}");
+        let shared: f64 = m.common.iter().map(|p| (relative(p, j) - relative(p, i)).powi(2)).sum();
+        let apart = shared + relative(sigma, i).powi(2) + relative(sigma, j).powi(2);
+        let want = 1e-4 * (hours(j) - hours(i));
+        println!("{i}, {j}: {apart:e}, {want:e}");
+        // Within an eighth of the run the walk counts as each one's own: at most a quarter of an eighth's variance twice.
+        let own = 1e-4 * 1.02 / 8.0 / 4.0;
+        assert!(apart > want * (1.0 - 1e-9) && apart < want + 2.0 * own, "{i} {j}: {apart:e} {want:e}");
+    }
+}

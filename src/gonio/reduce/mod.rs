@@ -37,11 +37,15 @@ pub enum ReduceError {
     /// No reading of the sample.
     #[error("no reading of the sample")]
     NoSample,
-    /// The instrument has no reference and its gain is not known either.
+    /// A reference is described, but was not read.
     #[error(
-        "there is neither a reading of the reference (with instrument.reference.reflectance) nor a gain (instrument.electrons)"
+        "instrument.reference.reflectance = {reflectance} describes a reference, and no reading of it is there; expected one at least (kind `reference`), or \
+         a description without one (reflectance = 0), the gain being known (instrument.electrons)"
     )]
-    NoScale,
+    UnreadReference {
+        /// Its certificate.
+        reflectance: f64,
+    },
     /// Readings of the reference without its certificate.
     #[error("the reference was read, but its reflectance is not stated (instrument.reference.reflectance)")]
     NoCertificate,
@@ -96,7 +100,8 @@ pub fn reduce(
         return Err(ReduceError::NoSample);
     }
     if has_reference != instrument.has_reference() {
-        return Err(if has_reference { ReduceError::NoCertificate } else { ReduceError::NoScale });
+        let unread = || ReduceError::UnreadReference { reflectance: instrument.reference.reflectance };
+        return Err(if has_reference { ReduceError::NoCertificate } else { unread() });
     }
     let visits = Visits::new(&stops, raw, instrument)?;
     Ok(Work { raw, instrument, scale: Scale::new(instrument, raw.dimension), visits }.run(name, &stops, model))
@@ -161,7 +166,8 @@ impl Work<'_> {
     fn run(self, name: &str, stops: &[Stop], model: Option<&Truth<'_>>) -> Reduction {
         let (n, width) = (self.raw.directions.len(), self.raw.channels.len());
         let mut table = Table { values: vec![f64::NAN; n * width], variance: vec![0.0; n * width] };
-        let mut shared = Shared::new(n, width, &self.visits, self.instrument);
+        let end_s = self.raw.readings.last().map_or(0.0, |r| r.time_s + r.exposure_s);
+        let mut shared = Shared::new(n, width, (&self.visits, end_s), self.instrument);
         let mut left = Left::default();
         let samples: Vec<(&Stop, usize)> = stops
             .iter()

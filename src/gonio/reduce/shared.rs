@@ -12,8 +12,9 @@ use crate::gonio::instrument::Instrument;
 /// Most components of one kind of visits' errors, and most numbers that all may take.
 const MOST_GROUPS: usize = 6;
 const MOST_NUMBERS: usize = 50_000_000;
-/// Terms of the series of a walk that is known at both ends.
+/// Terms of the series of a walk that is known at both ends, and times that one is cut in halves that is known at its beginning.
 const MODES: usize = 2;
+const HALVINGS: u32 = 3;
 
 /// One component and what it belongs to.
 struct Component {
@@ -46,6 +47,8 @@ pub(super) struct Shared<'a> {
     /// Visits that are one component.
     group: usize,
     has_reference: bool,
+    /// When the last reading was made.
+    end_s: f64,
 }
 
 /// Families in the order of the budget.
@@ -75,7 +78,7 @@ const NAMES: [(&str, Type); 11] = [
 ];
 
 impl<'a> Shared<'a> {
-    pub fn new(entries: usize, width: usize, visits: &Visits, instrument: &'a Instrument) -> Self {
+    pub fn new(entries: usize, width: usize, (visits, end_s): (&Visits, f64), instrument: &'a Instrument) -> Self {
         let size = entries * width;
         let afforded = (MOST_NUMBERS / size.max(1) / (2 * width + 2 * MODES + 1)).clamp(1, MOST_GROUPS);
         let families = NAMES
@@ -91,6 +94,7 @@ impl<'a> Shared<'a> {
             places: std::collections::HashMap::new(),
             group: visits.len().div_ceil(afforded).max(1),
             has_reference: visits.has[1],
+            end_s,
         }
     }
 
@@ -157,7 +161,7 @@ impl<'a> Shared<'a> {
             self.bridge(DRIFT, place, &at.reference_gap, value * drift);
         } else {
             // Nothing tells how far the power has walked since the start.
-            self.add(DRIFT, (0, 0), place, value * drift * (of.time_s / 3600.0).sqrt());
+            self.walk(DRIFT, place, of.time_s, value * drift);
         }
         self.bridge(DARK, place, &at.base_gap, conversion * self.instrument.detector.dark_drift_per_sqrt_hour);
         let detector = &self.instrument.detector;
@@ -166,6 +170,30 @@ impl<'a> Shared<'a> {
             let bent = conversion * rate.mean * rate.signal - of_reference;
             self.add(NONLINEARITY, (0, 0), place, detector.nonlinearity_u / detector.full_well * bent);
         }
+    }
+
+    /// A walk of σ `per_sqrt_hour` that is 0 at the start and known nowhere else, as Lévy made it: to its end in a line, and in the middle of each half, quarter
+    /// … off the line between its ends by half the root of its length. Within the last pieces it is a bridge, each reading's own: readings in two of them
+    /// differ as much as they do, two in one by no less.
+    fn walk(&mut self, family: usize, place: usize, time_s: f64, per_sqrt_hour: f64) {
+        if per_sqrt_hour == 0.0 || self.end_s <= 0.0 {
+            return;
+        }
+        let (late, sigma) = ((time_s / self.end_s).clamp(0.0, 1.0), per_sqrt_hour * (self.end_s / 3600.0).sqrt());
+        self.add(family, (0, 0), place, sigma * late);
+        let piece = |pieces: f64| {
+            let number = (late * pieces).floor().min(pieces - 1.0);
+            (number as usize, late * pieces - number)
+        };
+        for halving in 0..HALVINGS {
+            let pieces = f64::from(1 << halving);
+            let (number, along) = piece(pieces);
+            let off = 0.5 * (1.0 - (2.0 * along - 1.0).abs()) / pieces.sqrt();
+            self.add(family, (0, (1 << halving) + number), place, sigma * off);
+        }
+        let pieces = f64::from(1 << HALVINGS);
+        let (_, along) = piece(pieces);
+        self.add_own(family, place, sigma * sigma * along * (1.0 - along) / pieces);
     }
 
     /// A walk of σ `per_sqrt_hour` that two visits know the ends of: a Brownian bridge, √2 Σ sin(mπτ)/(mπ) times normal numbers and √span. Before the

@@ -45,23 +45,18 @@ pub(super) fn stops(raw: &Raw, instrument: &Instrument) -> Vec<Stop> {
 }
 
 fn combined(raw: &Raw, instrument: &Instrument, first: usize, run: &[Reading]) -> Stop {
+    let mut exposures: Vec<f64> = run.iter().map(|reading| reading.exposure_s).collect();
+    exposures.sort_by(|a, b| b.total_cmp(a));
+    exposures.dedup();
     let channel = |c: usize| {
-        // The longest exposure of which no reading saturates.
-        let exposures = run.chunk_by(|a, b| a.exposure_s == b.exposure_s);
-        let mut begin = first;
-        let mut best: Option<(f64, Rate)> = None;
-        for list in exposures {
-            // A repeat that was not read counts for nothing.
-            let all = (begin..begin + list.len()).map(|i| raw.signals(i)[c]);
+        // The longest exposure of which no reading saturates; a repeat that was not read counts for nothing.
+        exposures.iter().find_map(|exposure| {
+            let of_exposure = run.iter().enumerate().filter(|(_, reading)| reading.exposure_s == *exposure);
+            let all = of_exposure.map(|(i, _)| raw.signals(first + i)[c]);
             let signals: Vec<f64> = all.filter(|s| !s.is_nan()).collect();
-            begin += list.len();
-            let exposure = list[0].exposure_s;
             let usable = !signals.is_empty() && signals.iter().all(|s| *s < limit(instrument));
-            if usable && best.is_none_or(|(longest, _)| exposure > longest) {
-                best = Some((exposure, rate(&signals, exposure, instrument)));
-            }
-        }
-        best.map(|(_, rate)| rate)
+            usable.then(|| rate(&signals, *exposure, instrument))
+        })
     };
     let end = run[run.len() - 1];
     Stop {
