@@ -1,9 +1,13 @@
 //! Scene files: the built-in ones come back from TOML, and every broken one says where and why.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use glam::DVec3;
+use goniofit::brdf::Reflectance;
+use goniofit::control::Control;
 use goniofit::render::scene::{BUILT_IN, builtin};
-use goniofit::render::{Materials, RenderError, Scene, SceneSpec};
+use goniofit::render::{Material, Materials, Options, RenderError, Scene, SceneSpec, render};
 
 #[test]
 fn built_in_scenes_build_and_survive_a_round_trip() {
@@ -54,6 +58,13 @@ fn every_broken_scene_says_where_and_why() {
         ("sphere-light-without-size", "`light.sphere[0].radius` is 0.0, but must be a finite number above 0"),
         ("mesh-light-negative", "`light.mesh[0].radiance` is [1.0, -1.0, 1.0]"),
         ("mesh-of-nothing", "`mesh[0]` is neither, but must be either a `file` or a `builtin`"),
+        (
+            "variant-of-nothing",
+            "`materials.third.variant.of` is \"bull\", but must be the name of a material of this scene that is no variant",
+        ),
+        ("variant-of-a-variant", "`materials.third.variant.of` is \"other\""),
+        ("variant-scaled-up", "`materials.third.variant.scale` is Some(1.5), but must be from 0 to 1"),
+        ("variant-exponent-negative", "`materials.third.variant.exponent` is Some(-1.0), but must be from 0 to 1e8"),
         ("instance-without-size", "`mesh[0].instance[0].scale` is 0.0, but must be a finite number above 0"),
     ];
     for (name, words) in expected {
@@ -63,6 +74,42 @@ fn every_broken_scene_says_where_and_why() {
     }
     let files = std::fs::read_dir(&folder).expect("folder").count();
     assert_eq!(files, expected.len(), "every fixture is tested");
+}
+
+/// Mean radiance of the balls of the sweep, from left to right.
+fn balls(subject: Option<Material>) -> Vec<DVec3> {
+    let spec = builtin("gradient-sweep").expect("built in");
+    let materials: Materials = subject.into_iter().map(|material| ("ball".to_owned(), material)).collect();
+    let built = Scene::build(&spec, Path::new("."), &materials).expect("builds");
+    let options = Options { width: 240, height: 60, samples: 4, seed: 1, ..Options::default() };
+    let film = render(&built, &options, Control::silent()).expect("renders");
+    let ball = |k: u32| (21 + 38 * k..30 + 38 * k).flat_map(|x| (22..31).filter_map(move |y| Some((x, y))));
+    (0..6).map(|k| ball(k).filter_map(|(x, y)| film.radiance(x, y)).sum::<DVec3>() / 81.0).collect()
+}
+
+#[test]
+fn the_sweep_changes_the_exponent_or_where_there_is_none_the_albedo() {
+    let spec = builtin("gradient-sweep").expect("built in");
+    let variants: Vec<_> =
+        spec.spheres.iter().map(|s| spec.materials[&s.material].variant.clone().expect("one")).collect();
+    assert_eq!(variants.len(), 6);
+    // Each value is said in the description.
+    for variant in &variants {
+        let (n, percent) = (variant.exponent.expect("an exponent"), 100.0 * variant.scale.expect("a scale"));
+        let [n, percent] = [if n < 1e3 { format!("{n}") } else { format!("{n:e}") }, format!("{percent}")];
+        let words: Vec<&str> = spec.description.split([' ', ',', ';']).collect();
+        assert!(words.contains(&&n[..]) && words.contains(&&percent[..]), "{n}, {percent}: {}", spec.description);
+    }
+    // A diffuse material without neighbours would reflect in proportion to the scale; light between balls and floor adds to it.
+    let matte = balls(Some(Material::Brdf(Arc::new(Reflectance::lambert(vec![0.6; 3])))));
+    for (k, variant) in variants.iter().enumerate().take(5) {
+        let share = matte[k].x / matte[5].x;
+        let scale = variant.scale.expect("a scale");
+        assert!((0.7..1.2).contains(&(share / scale)), "ball {k}: {share} of the whole, scale {scale}");
+    }
+    // A table has no lobe either; a lobe's highlight gets narrower.
+    let glossy = |n| Material::Brdf(Arc::new(Reflectance::lobes(vec![0.1; 3], [(vec![0.3; 3], n)])));
+    assert_eq!(balls(Some(glossy(7.0))), balls(Some(glossy(70.0))), "the material's own exponent is replaced");
 }
 
 #[test]

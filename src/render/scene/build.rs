@@ -11,6 +11,7 @@ use super::super::material::{Material, Materials, PhongEquation};
 use super::super::shapes::{Geometry, Owner};
 use super::parts::{Files, common_origin, environment, geometry, lights};
 use super::spec::{MaterialSpec, SceneSpec};
+use super::variant::vary;
 use super::{CameraSpec, Filter};
 use crate::brdf::Reflectance;
 
@@ -71,9 +72,13 @@ impl Scene {
 
 fn resolve(spec: &SceneSpec, name: &str, own: &MaterialSpec, given: &Materials) -> Result<Material, RenderError> {
     let fail = |reason: String| RenderError::Material { origin: spec.name.clone(), name: name.into(), reason };
-    let material = match given.get(name) {
-        Some(material) => material.clone(),
-        None => inline(own).map_err(|file| fail(format!("its file {} was not loaded", file.display())))?,
+    let material = match (given.get(name), &own.variant) {
+        (Some(material), _) => material.clone(),
+        (None, Some(variant)) => match spec.materials.get(&variant.of) {
+            Some(base) => vary(&resolve(spec, &variant.of, base, given)?, variant),
+            None => Material::Black, // validated: never
+        },
+        (None, None) => inline(own).map_err(|file| fail(format!("its file {} was not loaded", file.display())))?,
     };
     if let Material::Brdf(brdf) = &material
         && !matches!(brdf.channels(), 1 | 3)

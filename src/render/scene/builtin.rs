@@ -13,11 +13,13 @@ pub struct BuiltIn {
 }
 
 /// All built-in scenes.
-pub const BUILT_IN: [BuiltIn; 5] = [
+pub const BUILT_IN: [BuiltIn; 7] = [
     BuiltIn { name: "sphere", toml: include_str!("../../../data-fixtures/scenes/sphere.toml") },
     BuiltIn { name: "sphere-on-plane", toml: include_str!("../../../data-fixtures/scenes/sphere-on-plane.toml") },
     BuiltIn { name: "cornell", toml: include_str!("../../../data-fixtures/scenes/cornell.toml") },
     BuiltIn { name: "mesh-env", toml: include_str!("../../../data-fixtures/scenes/mesh-env.toml") },
+    BuiltIn { name: "preview", toml: include_str!("../../../data-fixtures/scenes/preview.toml") },
+    BuiltIn { name: "gradient-sweep", toml: include_str!("../../../data-fixtures/scenes/gradient-sweep.toml") },
     BuiltIn { name: "furnace", toml: include_str!("../../../data-fixtures/scenes/furnace.toml") },
 ];
 

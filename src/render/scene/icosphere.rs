@@ -1,19 +1,14 @@
-//! The meshes that the program makes.
+//! The displaced icosphere.
 
 use glam::DVec3;
 
 use super::super::shapes::Mesh;
-use super::spec::BuiltInMesh;
 
-impl BuiltInMesh {
-    /// Its triangles, with coordinates that a file of 32-bit floats could hold.
-    pub(crate) fn mesh(self) -> Mesh {
-        let (vertices, faces) = match self {
-            Self::DisplacedIcosphere => displaced_icosphere(),
-        };
-        let corner = |i: u32| vertices[i as usize];
-        Mesh { triangles: faces.iter().map(|face| face.map(corner)).collect(), normals: Vec::new() }
-    }
+/// Its triangles, each flat.
+pub(super) fn mesh() -> Mesh {
+    let (vertices, faces) = displaced_icosphere();
+    let corner = |i: u32| vertices[i as usize];
+    Mesh { triangles: faces.iter().map(|face| face.map(corner)).collect(), normals: Vec::new() }
 }
 
 /// The icosphere of 20·4⁷ = 327,680 triangles, each vertex v moved to r(v)·v with
@@ -78,7 +73,7 @@ mod tests {
 
     #[test]
     fn the_mesh_is_closed_and_faces_outward() {
-        let mesh = BuiltInMesh::DisplacedIcosphere.mesh();
+        let mesh = mesh();
         assert_eq!(mesh.triangles.len(), 327_680);
         let volume: f64 = mesh.triangles.iter().map(|[a, b, c]| a.dot(b.cross(*c)) / 6.0).sum();
         // Mean of r³ over the sphere, by the same faces: within the displacement's square of the ball's 4π/3.

@@ -7,8 +7,10 @@ mod light_spec;
 mod parts;
 mod sky;
 mod spec;
+mod turned;
 mod validate;
 mod validate_lights;
+mod variant;
 
 pub use build::Scene;
 pub use builtin::{BUILT_IN, BuiltIn, builtin};
@@ -18,5 +20,5 @@ pub use light_spec::{
 };
 pub use spec::{
     BuiltInMesh, CameraSpec, EquationSpec, FilmSpec, Filter, MaterialSpec, MeshNormals, MeshSpec, PhongLobeSpec,
-    PlacementSpec, PlaneSpec, QuadSpec, SceneSpec, SphereSpec,
+    PlacementSpec, PlaneSpec, QuadSpec, SceneSpec, SphereSpec, VariantSpec,
 };

@@ -24,7 +24,7 @@ impl Files {
         for mesh in &spec.meshes {
             files.meshes.push(match (&mesh.file, mesh.builtin) {
                 (Some(file), _) => read_mesh(&base.join(file), mesh.normals == MeshNormals::Vertex)?,
-                (None, Some(builtin)) => builtin.mesh(),
+                (None, Some(builtin)) => builtin.mesh(mesh.normals == MeshNormals::Vertex),
                 (None, None) => Mesh::default(), // validated: never
             });
         }

@@ -109,7 +109,7 @@ impl Default for FilmSpec {
     }
 }
 
-/// A material: a sum of lobes (`kd`, `phong`), or a `file`, or Phong's `equation`, or `black`.
+/// A material: a sum of lobes (`kd`, `phong`), or a `file`, or Phong's `equation`, or `black`, or a `variant` of another.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialSpec {
@@ -123,6 +123,23 @@ pub struct MaterialSpec {
     pub equation: Option<EquationSpec>,
     /// Reflects nothing.
     pub black: bool,
+    /// Another material of the scene with one property changed.
+    pub variant: Option<VariantSpec>,
+}
+
+/// The material `of`, whatever stands in its place, with one property changed: the `exponent` of its Phong lobes (α of Phong's
+/// equation) where it has any, else all that it reflects, times `scale`. What is left out is not changed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VariantSpec {
+    /// Name of a material of this scene that is no variant itself.
+    pub of: String,
+    /// Exponent n, 0 to 10⁸.
+    #[serde(default)]
+    pub exponent: Option<f64>,
+    /// Factor, 0 to 1.
+    #[serde(default)]
+    pub scale: Option<f64>,
 }
 
 /// The lobe ks·(n+2)/(2π)·cosⁿα in 1/sr, α the angle between wo and the mirror image of wi.
@@ -213,6 +230,11 @@ pub struct MeshSpec {
 pub enum BuiltInMesh {
     /// A unit sphere of 327,680 triangles with bumps of up to 7.5 %.
     DisplacedIcosphere,
+    /// A disc of radius 1 about +y from y = 0 to y = 0.16, its upper edge rounded with radius 0.05; it has vertex normals.
+    RoundedDisc,
+    /// A backdrop: a floor at y = 0, 60 wide, from z = 30 to −2, which bends up with radius 6 to a wall at z = −8, 16 high; it
+    /// has vertex normals.
+    Cove,
 }
 
 /// Where a mesh stands: it is scaled, then turned about an axis through 0, then moved.
@@ -242,7 +264,7 @@ pub enum MeshNormals {
     /// Each face is flat.
     #[default]
     Face,
-    /// The file's vertex normals, interpolated.
+    /// The vertex normals, interpolated.
     Vertex,
 }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::super::RenderError;
 use super::super::film::MAX_PIXELS;
-use super::spec::{MaterialSpec, MeshNormals, PlacementSpec, SceneSpec};
+use super::spec::{BuiltInMesh, MaterialSpec, MeshNormals, PlacementSpec, SceneSpec, VariantSpec};
 use super::validate_lights::validate_lights;
 
 /// Names the place of one value for the checks below.
@@ -77,6 +77,7 @@ impl SceneSpec {
         self.validate_camera(&check)?;
         for (name, material) in &self.materials {
             validate_material(&check, &format!("materials.{name}"), material)?;
+            material.variant.iter().try_for_each(|variant| self.validate_variant(&check, name, variant))?;
         }
         self.validate_shapes(&check)?;
         validate_lights(&check, &self.lights)?;
@@ -114,6 +115,18 @@ impl SceneSpec {
         check.holds((1..=1 << 24).contains(&samples), "film.samples", samples, "from 1 to 16777216")
     }
 
+    fn validate_variant(&self, check: &Check<'_>, name: &str, variant: &VariantSpec) -> Result<(), RenderError> {
+        let place = format!("materials.{name}.variant");
+        let of = self.materials.get(&variant.of);
+        let fits = of.is_some_and(|material| material.variant.is_none());
+        let constraint = "the name of a material of this scene that is no variant itself";
+        check.holds(fits, &format!("{place}.of"), &variant.of, constraint)?;
+        let exponent = variant.exponent.is_none_or(|n| (0.0..=1e8).contains(&n));
+        check.holds(exponent, &format!("{place}.exponent"), variant.exponent, "from 0 to 1e8")?;
+        let scale = variant.scale.is_none_or(|factor| (0.0..=1.0).contains(&factor));
+        check.holds(scale, &format!("{place}.scale"), variant.scale, "from 0 to 1")
+    }
+
     fn validate_shapes(&self, check: &Check<'_>) -> Result<(), RenderError> {
         for (i, s) in self.spheres.iter().enumerate() {
             check.finite(&format!("sphere[{i}].center"), s.center)?;
@@ -131,8 +144,13 @@ impl SceneSpec {
             let one = m.file.is_some() != m.builtin.is_some();
             let found = if m.file.is_some() { "both" } else { "neither" };
             check.holds(one, &format!("mesh[{i}]"), format_args!("{found}"), "either a `file` or a `builtin`")?;
-            let flat = m.builtin.is_none() || m.normals == MeshNormals::Face;
-            check.holds(flat, &format!("mesh[{i}].normals"), m.normals, "\"face\" where there is no `file`")?;
+            let flat = m.builtin != Some(BuiltInMesh::DisplacedIcosphere) || m.normals == MeshNormals::Face;
+            check.holds(
+                flat,
+                &format!("mesh[{i}].normals"),
+                m.normals,
+                "\"face\" for a mesh without vertex normals",
+            )?;
             for (k, place) in m.instances.iter().enumerate() {
                 check.placement(&format!("mesh[{i}].instance[{k}]"), place)?;
             }
@@ -158,9 +176,10 @@ impl SceneSpec {
 
 fn validate_material(check: &Check<'_>, place: &str, material: &MaterialSpec) -> Result<(), RenderError> {
     let lobes = material.kd.is_some() || !material.phong.is_empty();
-    let kinds = [lobes, material.file.is_some(), material.equation.is_some(), material.black];
-    let one = kinds.iter().filter(|given| **given).count();
-    let constraint = "exactly one of lobes (`kd`, `phong`), `file`, `equation`, `black = true`";
+    let described = [material.file.is_some(), material.equation.is_some(), material.variant.is_some()];
+    let kinds = [lobes, material.black].into_iter().chain(described);
+    let one = kinds.filter(|given| *given).count();
+    let constraint = "exactly one of lobes (`kd`, `phong`), `file`, `equation`, `black = true`, `variant`";
     check.holds(one == 1, place, format_args!("{one} kinds of material"), constraint)?;
     material.kd.iter().try_for_each(|kd| check.color(&format!("{place}.kd"), *kd))?;
     for (i, lobe) in material.phong.iter().enumerate() {
