@@ -147,31 +147,8 @@ pub(super) fn geometry(
     files: Files,
     lights: &[Light],
 ) -> Geometry {
-    let mut spheres: Vec<_> = spec
-        .spheres
-        .iter()
-        .map(|s| (Sphere { center: DVec3::from(s.center) - origin, radius: s.radius }, owner(&s.material)))
-        .collect();
-    let planes = spec.planes.iter().map(|p| {
-        let plane = Plane { point: DVec3::from(p.point) - origin, normal: DVec3::from(p.normal).normalize() };
-        (plane, owner(&p.material))
-    });
-    let mut quads: Vec<_> = spec
-        .quads
-        .iter()
-        .map(|q| (Quad::new(DVec3::from(q.center) - origin, q.u.into(), q.v.into()), owner(&q.material)))
-        .collect();
-    let (mut meshes, mut placed) = (Vec::new(), Vec::new());
-    for (mut mesh, described) in files.meshes.into_iter().zip(&spec.meshes) {
-        let owner = owner(&described.material);
-        if described.instances.is_empty() {
-            mesh.triangles.iter_mut().flatten().for_each(|p| *p -= origin);
-            meshes.push((mesh, owner));
-        } else {
-            let places = described.instances.iter().map(|p| placement(p).relative_to(origin)).collect();
-            placed.push((mesh, owner, places));
-        }
-    }
+    // Lights come before what reflects: of two that lie in each other a ray meets the one that comes first.
+    let (mut spheres, mut quads, mut meshes, mut placed) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (i, light) in lights.iter().enumerate() {
         let owner = Owner::Light { light: i as u32, part: 0 };
         match light {
@@ -181,6 +158,30 @@ pub(super) fn geometry(
                 meshes.push((Mesh { triangles: light.triangles().to_vec(), normals: Vec::new() }, owner));
             }
             Light::Point { .. } | Light::Directional { .. } | Light::Spot(_) => {}
+        }
+    }
+    spheres.extend(
+        spec.spheres
+            .iter()
+            .map(|s| (Sphere { center: DVec3::from(s.center) - origin, radius: s.radius }, owner(&s.material))),
+    );
+    let planes = spec.planes.iter().map(|p| {
+        let plane = Plane { point: DVec3::from(p.point) - origin, normal: DVec3::from(p.normal).normalize() };
+        (plane, owner(&p.material))
+    });
+    quads.extend(
+        spec.quads
+            .iter()
+            .map(|q| (Quad::new(DVec3::from(q.center) - origin, q.u.into(), q.v.into()), owner(&q.material))),
+    );
+    for (mut mesh, described) in files.meshes.into_iter().zip(&spec.meshes) {
+        let owner = owner(&described.material);
+        if described.instances.is_empty() {
+            mesh.triangles.iter_mut().flatten().for_each(|p| *p -= origin);
+            meshes.push((mesh, owner));
+        } else {
+            let places = described.instances.iter().map(|p| placement(p).relative_to(origin)).collect();
+            placed.push((mesh, owner, places));
         }
     }
     Geometry::new(spheres, planes.collect(), quads, meshes, placed)

@@ -75,7 +75,8 @@ impl Geometry {
         self.spheres.len() + self.planes.len() + self.quads.len() + usize::from(self.triangles.is_some()) + placed
     }
 
-    /// The surface that the ray meets first.
+    /// The surface that the ray meets first. Of surfaces at the same distance it is the first of the spheres, else of the quads, so
+    /// that a square light in a floor is seen.
     pub fn closest(&self, ray: &Ray) -> Option<Surface> {
         let (mut t_max, mut best) = (ray.t_max, None);
         for (i, (sphere, _)) in self.spheres.iter().enumerate() {
@@ -83,14 +84,14 @@ impl Geometry {
                 (t_max, best) = (t, Some(Hit::Sphere(i)));
             }
         }
-        for (i, (plane, _)) in self.planes.iter().enumerate() {
-            if let Some(t) = plane.hit(ray, t_max) {
-                (t_max, best) = (t, Some(Hit::Plane(i)));
-            }
-        }
         for (i, (quad, _)) in self.quads.iter().enumerate() {
             if let Some((t, a, b)) = quad.hit(ray, t_max) {
                 (t_max, best) = (t, Some(Hit::Quad(i, a, b)));
+            }
+        }
+        for (i, (plane, _)) in self.planes.iter().enumerate() {
+            if let Some(t) = plane.hit(ray, t_max) {
+                (t_max, best) = (t, Some(Hit::Plane(i)));
             }
         }
         if let Some(hit) = self.triangles.as_ref().and_then(|mesh| mesh.closest(&Ray { t_max, ..*ray })) {

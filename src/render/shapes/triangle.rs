@@ -9,6 +9,7 @@ use crate::numeric::float::diff_of_products;
 #[derive(Debug, Clone, Copy)]
 pub struct ShearedRay {
     origin: DVec3,
+    direction: DVec3,
     axes: [usize; 3],
     shear: DVec3,
 }
@@ -22,9 +23,10 @@ impl ShearedRay {
         // The two other axes change places where d runs backwards, which keeps the winding.
         let axes = if d[z] < 0.0 { [y, x, z] } else { [x, y, z] };
         let shear = DVec3::new(d[axes[0]] / d[z], d[axes[1]] / d[z], 1.0 / d[z]);
-        Self { origin: ray.origin, axes, shear }
+        Self { origin: ray.origin, direction: d, axes, shear }
     }
 
+    #[inline]
     fn apply(&self, p: DVec3) -> DVec3 {
         let q = p - self.origin;
         let [x, y, z] = self.axes;
@@ -35,7 +37,7 @@ impl ShearedRay {
     /// second and third corner. A ray through a shared edge or corner meets at least one of the triangles that share it: an
     /// edge's function changes only its sign between its two triangles.
     pub fn hit(&self, corners: &[DVec3; 3], t_max: f64) -> Option<(f64, f64, f64)> {
-        let [a, b, c] = corners.map(|p| self.apply(p));
+        let [a, b, c] = [self.apply(corners[0]), self.apply(corners[1]), self.apply(corners[2])];
         let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
         if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
             return None;
@@ -46,8 +48,32 @@ impl ShearedRay {
         }
         let (b0, b1, b2) = (u / determinant, v / determinant, w / determinant);
         let t = b0 * a.z + b1 * b.z + b2 * c.z;
-        (t > 0.0 && t < t_max).then_some((t, b1, b2))
+        let met = t > 0.0 && t < t_max && (t > t_error([a, b, c], [u, v, w], determinant) || self.nears(corners));
+        met.then_some((t, b1, b2))
     }
+
+    /// Whether the plane of the triangle lies ahead: tells a hit close to the start from the neighbour of a surface that the ray leaves.
+    fn nears(&self, [a, b, c]: &[DVec3; 3]) -> bool {
+        let (p, q) = (*b - *a, *c - *a);
+        let normal = DVec3::new(
+            diff_of_products(p.y, q.z, p.z, q.y),
+            diff_of_products(p.z, q.x, p.x, q.z),
+            diff_of_products(p.x, q.y, p.y, q.x),
+        );
+        let (ahead, along) = (normal.dot(*a - self.origin), normal.dot(self.direction));
+        (ahead > 0.0 && along > 0.0) || (ahead < 0.0 && along < 0.0)
+    }
+}
+
+/// Bound on the rounding error of t (Pharr, Jakob, Humphreys 2023, section 6.8.7): nothing to speak of for most triangles, and more than
+/// what a ray is lifted off its surface by where a needle's area cancels. Nearer hits may be the needle's neighbour, which the ray leaves.
+fn t_error(corners: [DVec3; 3], edges: [f64; 3], determinant: f64) -> f64 {
+    let [a, b, c] = corners.map(DVec3::abs);
+    let most = a.max(b).max(c);
+    let error = DVec3::new(gamma(5) * (most.x + most.z), gamma(5) * (most.y + most.z), gamma(3) * most.z);
+    let edge_error = 2.0 * (gamma(2) * most.x * most.y + error.y * most.x + error.x * most.y);
+    let edge = edges.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+    3.0 * (gamma(3) * edge * most.z + edge_error * most.z + error.z * edge) / determinant.abs()
 }
 
 /// Twice the signed area of the origin, p and q in the plane; where products cancel to 0, by the exact form.
