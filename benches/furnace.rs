@@ -4,7 +4,6 @@
 
 #[path = "../tests/furnace_support/mod.rs"]
 mod furnace_support;
-#[allow(dead_code)] // the tests use more of it
 #[path = "../tests/table_support/mod.rs"]
 mod table_support;
 

@@ -1,5 +1,7 @@
 //! Scene files: the built-in ones come back from TOML, and every broken one says where and why.
 
+#![allow(clippy::expect_used)] // these are tests
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -83,7 +85,7 @@ fn balls(subject: Option<Material>) -> Vec<DVec3> {
     let built = Scene::build(&spec, Path::new("."), &materials).expect("builds");
     let options = Options { width: 240, height: 60, samples: 4, seed: 1, ..Options::default() };
     let film = render(&built, &options, Control::silent()).expect("renders");
-    let ball = |k: u32| (21 + 38 * k..30 + 38 * k).flat_map(|x| (22..31).filter_map(move |y| Some((x, y))));
+    let ball = |k: u32| (21 + 38 * k..30 + 38 * k).flat_map(|x| (22..31).map(move |y| (x, y)));
     (0..6).map(|k| ball(k).filter_map(|(x, y)| film.radiance(x, y)).sum::<DVec3>() / 81.0).collect()
 }
 
