@@ -116,9 +116,9 @@ mod tests {
         let r: f64 = 0.05;
         let from_axis = 1.0 - r * (10.0 - 3.0 * PI) / (12.0 - 3.0 * PI);
         let want = PI * 0.16 - TAU * from_axis * r * r * (1.0 - 0.25 * PI);
-        // 256 flat sectors lose (2π/256)²/6 = 1.0·10⁻⁴ of it.
+        // 256 flat sectors lose (2π/256)²/6 = 1.00·10⁻⁴ of it, the 24 chords of the edge r²/2·24·(π/48)³/6 turned, 0.17·10⁻⁴.
         let lost = 1.0 - volume(&mesh) / want;
-        assert!((0.9e-4..1.1e-4).contains(&lost), "{} vs {want}: {lost:e}", volume(&mesh));
+        assert!((1.16e-4..1.19e-4).contains(&lost), "{} vs {want}: {lost:e}", volume(&mesh));
         let total: DVec3 = mesh.triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).sum();
         assert!(total.length() < 1e-6, "a closed surface has no direction: {total}");
     }
