@@ -67,6 +67,10 @@ fn every_broken_scene_says_where_and_why() {
         ("variant-of-a-variant", "`materials.third.variant.of` is \"other\""),
         ("variant-scaled-up", "`materials.third.variant.scale` is Some(1.5), but must be from 0 to 1"),
         ("variant-exponent-negative", "`materials.third.variant.exponent` is Some(-1.0), but must be from 0 to 1e8"),
+        (
+            "mesh-without-vertex-normals",
+            "`mesh[0].normals` is Vertex, but must be \"face\" for a mesh without vertex normals",
+        ),
         ("instance-without-size", "`mesh[0].instance[0].scale` is 0.0, but must be a finite number above 0"),
     ];
     for (name, words) in expected {
