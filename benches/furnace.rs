@@ -22,7 +22,7 @@ const BATCH: u32 = 1 << 20;
 fn off(material: &Material, want: f64, theta: f64, most: u32) -> (f64, f64, u32) {
     let (mut sum, mut variance, mut batches) = (0.0, 0.0, 0);
     loop {
-        let (got, noise) = rendered(material, theta, BATCH, u64::from(batches));
+        let (got, noise) = rendered(material, theta, BATCH, u64::from(batches), false);
         sum += got.x;
         variance += noise.x * noise.x;
         batches += 1;

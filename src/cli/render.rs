@@ -14,7 +14,7 @@ use crate::image::{Image, LayerKind, develop, encode_exr, encode_png, exposure_f
 use crate::render::{LayerSet, Options, SceneSpec};
 
 /// About what a value of a picture takes to be written, s: this much of a time budget is kept for that.
-const WRITING: f64 = 2.5e-8;
+const WRITING: f64 = 6e-8;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -125,8 +125,8 @@ impl Args {
         let planes = 7 + self.layers.len() * 3;
         let writing =
             Duration::from_secs_f64(WRITING * f64::from(asked.width) * f64::from(asked.height) * planes as f64);
-        let time_budget = self.time_budget.map(|time| time.saturating_sub(ui.elapsed()).saturating_sub(writing));
-        Options { samples, target_error: self.target_error, time_budget, layers: LayerSet::of(&self.layers), ..asked }
+        let deadline = self.time_budget.map(|time| ui.start() + time.saturating_sub(writing));
+        Options { samples, target_error: self.target_error, deadline, layers: LayerSet::of(&self.layers), ..asked }
     }
 }
 
@@ -169,6 +169,13 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let met = image.metadata.relative_error.is_some_and(|[_, most]| args.target_error.is_none_or(|t| most <= t));
     if let (Some(target), false) = (args.target_error, met) {
         ui.warn(&format!("the relative error asked for, {} %, was not reached", significant(100.0 * target)));
+    }
+    let empty = share_of(&image, |i| image.standard_error.as_ref().is_some_and(|e| e[i][0].is_infinite()));
+    if empty > 0.0 && ended_early(&image) {
+        ui.warn(&format!(
+            "{:.1} % of the pixels have too few samples to be judged, or none: give more time, or a smaller --size",
+            100.0 * empty
+        ));
     }
     let unknown = unknown_share(&image);
     if unknown > 0.0 {
@@ -225,10 +232,20 @@ fn check_extension(path: &Path, wanted: &str, option: &str) -> Result<(), Failur
     Err(Failure::usage(format!("{option}: expected a name that ends in .{wanted}, found {}", path.display())))
 }
 
-/// Share of the pixels that are masked.
+/// Share of the pixels that are masked for what was not measured, not for want of samples.
 fn unknown_share(image: &Image) -> f64 {
+    let without = |i: usize| image.standard_error.as_ref().is_some_and(|e| e[i][0].is_infinite());
+    share_of(image, |i| image.is_masked(i) && !(ended_early(image) && without(i)))
+}
+
+/// Whether there are pixels without samples.
+fn ended_early(image: &Image) -> bool {
+    image.metadata.samples == Some(0)
+}
+
+fn share_of(image: &Image, is: impl Fn(usize) -> bool) -> f64 {
     let pixels = image.radiance.len();
-    (0..pixels).filter(|i| image.is_masked(*i)).count() as f64 / pixels.max(1) as f64
+    (0..pixels).filter(|i| is(*i)).count() as f64 / pixels.max(1) as f64
 }
 
 fn mean_of(image: &Image) -> [f64; 3] {

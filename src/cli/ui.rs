@@ -53,9 +53,9 @@ impl Ui {
         Self { json, quiet, start: Instant::now(), bar: Bar { shown, current: Mutex::new(None) } }
     }
 
-    /// Time since the command began.
-    pub fn elapsed(&self) -> Duration {
-        self.start.elapsed()
+    /// When the command began.
+    pub fn start(&self) -> Instant {
+        self.start
     }
 
     /// Whether stdout holds one JSON object and nothing else.

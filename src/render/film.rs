@@ -1,6 +1,6 @@
 //! The film: passes over the picture, and what every pixel has gathered.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -38,8 +38,8 @@ pub struct Options {
     pub samples: u32,
     /// Relative error that the picture may have ([`PictureError::at_most`]), above 0: samples go where it is noisy until that is met.
     pub target_error: Option<f64>,
-    /// Time for the picture: the best within that, or within the time it takes to meet the target.
-    pub time_budget: Option<Duration>,
+    /// When work ends at the latest: the best by then, or what meets the target.
+    pub deadline: Option<Instant>,
     /// Key of all random numbers.
     pub seed: u64,
     /// How lights are found.
@@ -53,8 +53,8 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         let (strategy, layers) = (Strategy::default(), LayerSet::default());
-        let (target_error, time_budget) = (None, None);
-        Self { width: 512, height: 512, samples: 64, target_error, time_budget, seed: 0, strategy, layers, plan: None }
+        let (target_error, deadline) = (None, None);
+        Self { width: 512, height: 512, samples: 64, target_error, deadline, seed: 0, strategy, layers, plan: None }
     }
 }
 

@@ -1,6 +1,6 @@
 //! How many samples the tiles of a picture get, round after round.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::film::Options;
 use super::noise::{Noise, PictureError};
@@ -20,25 +20,25 @@ pub(super) struct Schedule {
     most: u32,
     target: Option<f64>,
     start: Instant,
-    budget: Option<Duration>,
+    deadline: Option<Instant>,
     /// Samples that tiles have, which all pixels of a tile share.
     have: Vec<u32>,
 }
 
 impl Schedule {
     pub fn new(options: &Options, tiles: usize, start: Instant) -> Self {
-        let (target, budget) = (options.target_error, options.time_budget);
-        Self { most: options.samples, target, start, budget, have: vec![0; tiles] }
+        let (target, deadline) = (options.target_error, options.deadline);
+        Self { most: options.samples, target, start, deadline, have: vec![0; tiles] }
     }
 
     /// Whether rounds depend on what earlier ones found.
     pub fn adapts(&self) -> bool {
-        self.target.is_some() || self.budget.is_some()
+        self.target.is_some() || self.deadline.is_some()
     }
 
     /// When work ends, at the latest.
     pub fn deadline(&self) -> Option<Instant> {
-        self.budget.map(|budget| self.start + budget)
+        self.deadline
     }
 
     /// The tiles' samples so far.
@@ -53,7 +53,7 @@ impl Schedule {
 
     /// What the first round brings, for portions of at least `least`.
     pub fn first(&self, least: u32) -> Vec<u32> {
-        let wanted = match (self.adapts(), self.budget) {
+        let wanted = match (self.adapts(), self.deadline) {
             (false, _) => least,
             (true, Some(_)) => least.max(2),
             (true, None) => FIRST,
@@ -74,9 +74,10 @@ impl Schedule {
         }
         let total: f64 = self.have.iter().map(|n| f64::from(*n)).sum();
         let mut affordable = f64::INFINITY;
-        if let Some(budget) = self.budget {
-            let spent = self.start.elapsed().as_secs_f64();
-            let left = budget.as_secs_f64() - spent;
+        if let Some(deadline) = self.deadline {
+            let now = Instant::now();
+            let spent = (now - self.start).as_secs_f64();
+            let left = deadline.saturating_duration_since(now).as_secs_f64();
             // Rounds double the work while there is time for two of them.
             affordable = total * (left / spent).min(1.0);
             if left <= 0.0 || affordable < 0.02 * total {

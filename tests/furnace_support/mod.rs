@@ -11,15 +11,15 @@ use glam::DVec3;
 use goniofit::brdf::{Brdf, LobeKind, LobeTerm, PerChannel, Sample};
 use goniofit::control::Control;
 use goniofit::geometry::{Frame, direction, mirror};
-use goniofit::render::{Material, Materials, Options, PhongEquation, Scene, SceneSpec, render};
+use goniofit::render::{Material, Materials, Options, PhongEquation, Plan, Scene, SceneSpec, render};
 
 /// Polar angles of the eye, degrees. Some tables jump at the incidences that were measured, multiples of 5°: a camera whose pixels lie
 /// on both sides of one would see the mean of two albedos.
 pub const THETAS_DEG: [f64; 8] = [0.1, 21.0, 41.0, 61.0, 76.0, 86.0, 89.0, 89.9];
 
 /// Radiance and its standard error as the renderer finds them, the eye at `theta_deg` from the normal: the mean over 8 × 8 pixels
-/// of a camera whose field of view is 10⁻⁵ degrees.
-pub fn rendered(material: &Material, theta_deg: f64, samples: u32, seed: u64) -> (DVec3, DVec3) {
+/// of a camera whose field of view is 10⁻⁵ degrees. Where there is a closed form, it is used or not.
+pub fn rendered(material: &Material, theta_deg: f64, samples: u32, seed: u64, closed: bool) -> (DVec3, DVec3) {
     let theta = theta_deg.to_radians();
     let eye = [theta.sin(), theta.cos(), 0.0];
     let text = format!(
@@ -31,7 +31,10 @@ pub fn rendered(material: &Material, theta_deg: f64, samples: u32, seed: u64) ->
     let spec = SceneSpec::parse(&text, "furnace").expect("a scene");
     let materials = Materials::from([("m".to_owned(), material.clone())]);
     let scene = Scene::build(&spec, Path::new("."), &materials).expect("builds");
-    let options = Options { width: 8, height: 8, samples: samples.div_ceil(64), seed, ..Options::default() };
+    let plan = Plan::of(&scene);
+    let plan = if closed { plan } else { Plan { closed_forms: false, chance: true, ..plan } };
+    let samples = samples.div_ceil(64);
+    let options = Options { width: 8, height: 8, samples, seed, plan: Some(plan), ..Options::default() };
     let film = render(&scene, &options, Control::silent()).expect("renders");
     let pixels = (0..8).flat_map(|y| (0..8).map(move |x| (x, y)));
     let (mut sum, mut variance) = (DVec3::ZERO, DVec3::ZERO);

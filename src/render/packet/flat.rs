@@ -96,7 +96,7 @@ impl<'a> FlatScene<'a> {
             let reach = (quad.center.abs() + quad.u.abs() + quad.v.abs()).max_element();
             (Piece { point: quad.center, normal: quad.normal, to_a, to_b, reach }, *owner)
         });
-        let pieces: Vec<_> = planes.chain(quads).map(|(piece, owner)| (piece, number(owner))).collect();
+        let pieces: Vec<_> = quads.chain(planes).map(|(piece, owner)| (piece, number(owner))).collect();
         let most = materials.iter().map(|m| m.phong.len()).max().unwrap_or(0);
         let all = Occluders {
             spheres: spheres.iter().map(|s| s.0).collect(),
