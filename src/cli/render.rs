@@ -158,6 +158,13 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         Some(name) => chain::picture_of(name, args.picture.rgb.as_ref(), &stage, &options, ui.control())?,
         None => chain::picture(&stage, None, &options, ui.control())?,
     };
+    if let (Some(time), Some(0.0)) = (args.time_budget, image.metadata.mean_samples) {
+        let time = time.as_secs_f64();
+        return Err(Failure::work(format!(
+            "{time} s is too short for {}: no sample was taken by then, so nothing is written; give more time",
+            stage.spec.name
+        )));
+    }
     write_bytes(&args.out, &encode_exr(&image)?)?;
     if let Some(png) = &args.png {
         let exposure = args.exposure.unwrap_or_else(|| exposure_for(&image));

@@ -67,3 +67,51 @@ fn a_rendered_picture_lights_another_scene_and_is_not_overwritten_by_it() {
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     assert!(b.exr("lit.exr").radiance.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
 }
+
+#[test]
+fn a_target_is_met_and_stated() {
+    let b = Bench::new();
+    let with = |more: &[&str]| [&["render", "--scene", "cornell", "--size", "32", "--out", "c.exr"], more].concat();
+    let found = b.json(&with(&["--target-error", "8%"]));
+    assert_eq!(found["target_met"], true);
+    assert!(found["relative_error_95"].as_f64().is_some_and(|e| e <= 0.08), "{found}");
+    assert!(found["mean_samples"].as_f64() >= found["samples"].as_f64(), "{found}");
+    let out_of_reach = b.ok(&with(&["--target-error", "0.1%", "--samples", "16"]));
+    assert!(out_of_reach.err.contains("asked for, 0.100 %, was not reached"), "{}", out_of_reach.err);
+    assert_eq!(b.exr("c.exr").metadata.samples, Some(16));
+    // Less than it takes to write the file.
+    let short = b.run(&["render", "--scene", "cornell", "--size", "512", "--time-budget", "1ms", "--out", "short.exr"]);
+    assert_eq!(short.code, Some(1), "{}", short.err);
+    assert!(short.err.contains("too short for cornell") && !b.path("short.exr").exists(), "{}", short.err);
+}
+
+#[test]
+fn effects_of_a_scene_say_what_is_on_and_what_it_is_worth() {
+    let b = Bench::new();
+    let arguments = ["effects", "--scene", "cornell", "--size", "16", "--samples", "32"];
+    let found = b.json(&arguments);
+    let list = found["effects"].as_array().expect("a list");
+    let effect = |name: &str| list.iter().find(|e| e["effect"] == name).expect("is known");
+    let noise = found["noise"].as_f64().expect("a number");
+    for name in ["shadows", "interreflection", "area lights"] {
+        let off_by = effect(name)["off_by"].as_f64().expect("a number");
+        assert!(effect(name)["on"] == true && off_by > 2.0 * noise, "{name}: {off_by}, noise {noise}");
+    }
+    assert!(effect("environment")["on"] == false && effect("environment")["off_by"].is_null());
+    assert!(found["full_off_by"].as_f64().is_some_and(|off| off < 2.0 * noise), "{found}");
+    let text = b.ok(&arguments).text();
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert_eq!(b.run(&["effects", "--scene", "cornell", "--scan", "merl"]).code, Some(2));
+}
+
+#[test]
+fn a_file_with_a_camera_is_a_scene_for_effects() {
+    let b = Bench::new();
+    b.write("s.toml", b.ok(&["scenes", "sphere", "--toml"]).out);
+    let with = |more: &[&str]| [&["effects", "s.toml", "--size", "8", "--samples", "8"], more].concat();
+    let said = b.ok(&with(&[])).text();
+    assert!(said.contains("nothing can stand between a surface and a light"), "{said}");
+    let wrong = b.run(&with(&["--noiseless"]));
+    assert_eq!(wrong.code, Some(2));
+    assert!(wrong.err.contains("--noiseless is for simulations, and sphere is a scene"), "{}", wrong.err);
+}

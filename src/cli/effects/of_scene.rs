@@ -71,7 +71,7 @@ fn table(name: &str, options: &Options, found: &SceneEffects) -> String {
     }
     let _ = write!(
         text,
-        "\n\nTwo pictures that differ by noise alone are {} off each other. Everything on, one\npath at a time: {:.3} s, {} off this picture.",
+        "\n\nTwo pictures that differ by noise alone are {} off each other. Everything\non, one path at a time: {:.3} s, {} off this picture.",
         share(found.noise),
         found.seconds_full,
         share(found.full_off_by)

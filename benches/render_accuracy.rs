@@ -1,0 +1,106 @@
+//! What `target_error` and a deadline promise, in 100 trials each, and what the plan of effects is worth: `cargo bench --bench render_accuracy` prints
+//! Markdown tables; `-- --trials 10` takes fewer trials.
+#![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use goniofit::control::Control;
+use goniofit::image::Image;
+use goniofit::render::scene::builtin;
+use goniofit::render::{Film, Materials, Options, Plan, Scene, render};
+
+const SIDE: u32 = 64;
+
+fn built(name: &str) -> Scene {
+    Scene::build(&builtin(name).expect("built in"), Path::new("."), &Materials::new()).expect("builds")
+}
+
+fn picture(scene: &Scene, options: Options) -> Film {
+    render(scene, &Options { width: SIDE, height: SIDE, ..options }, Control::silent()).expect("options are in range")
+}
+
+/// The root of the mean of (x − truth)²/(truth² + (L̄/10)²).
+fn off_by(image: &Image, truth: &Image) -> f64 {
+    let values = || truth.radiance.iter().flatten();
+    let n = values().count() as f64;
+    let floor = (0.1 * values().sum::<f64>() / n).powi(2);
+    let pairs = image.radiance.iter().flatten().zip(values());
+    (pairs.map(|(x, t)| (x - t).powi(2) / (t * t + floor)).sum::<f64>() / n).sqrt()
+}
+
+fn targets(trials: u64) {
+    println!(
+        "| scene | target | met in trials of {trials} | error, mean | stated, mean | samples a pixel |\n|---|---|---|---|---|---|"
+    );
+    for (name, target) in
+        [("sphere", 0.005), ("sphere-on-plane", 0.02), ("cornell", 0.05), ("cornell", 0.02), ("preview", 0.03)]
+    {
+        let scene = built(name);
+        let truth = picture(&scene, Options { samples: 1 << 15, seed: 1, ..Options::default() }).to_image();
+        let (mut met, mut error, mut stated, mut samples) = (0, 0.0, 0.0, 0.0);
+        for trial in 0..trials {
+            let options =
+                Options { samples: 1 << 20, seed: 100 + trial, target_error: Some(target), ..Options::default() };
+            let film = picture(&scene, options);
+            let off = off_by(&film.to_image(), &truth);
+            met += u64::from(off <= target);
+            error += off;
+            stated += film.error().expect("samples enough").relative;
+            samples += film.total_samples() as f64 / f64::from(SIDE * SIDE);
+        }
+        let n = trials as f64;
+        let percent = |x: f64| format!("{:.3} %", 100.0 * x / n);
+        println!(
+            "| {name} | {} % | {met} | {} | {} | {:.0} |",
+            100.0 * target,
+            percent(error),
+            percent(stated),
+            samples / n
+        );
+    }
+}
+
+fn deadlines(trials: u64) {
+    println!("\n| scene | time | kept within 10 % or 50 ms in trials of {trials} | longest over |\n|---|---|---|---|");
+    for (name, millis) in [("cornell", 50), ("cornell", 300), ("mesh-env", 300), ("sphere-on-plane", 1000)] {
+        let scene = built(name);
+        let budget = Duration::from_millis(millis);
+        let (mut kept, mut worst) = (0, 0.0f64);
+        for seed in 0..trials {
+            let start = Instant::now();
+            picture(&scene, Options { samples: 1 << 24, seed, deadline: Some(start + budget), ..Options::default() });
+            let over = start.elapsed().as_secs_f64() - budget.as_secs_f64();
+            kept += u64::from(over <= (0.1 * budget.as_secs_f64()).max(0.05));
+            worst = worst.max(over);
+        }
+        println!("| {name} | {millis} ms | {kept} | {:.1} ms |", 1e3 * worst);
+    }
+}
+
+/// 256 samples a pixel by the plan of the scene, without closed forms, and by the full integrator: time, and the error that the picture states.
+fn plans() {
+    println!("\n| scene | plan | time | relative error |\n|---|---|---|---|");
+    for name in ["sphere", "furnace", "sphere-on-plane", "cornell", "preview", "mesh-env"] {
+        let scene = built(name);
+        let derived = Plan::of(&scene);
+        let one_by_one = Plan { packets: false, closed_forms: false, chance: true, ..derived };
+        for (words, plan) in
+            [("of the scene", derived), ("the same, one path at a time", one_by_one), ("everything", Plan::FULL)]
+        {
+            let film = picture(&scene, Options { samples: 256, plan: Some(plan), ..Options::default() });
+            let error = film.error().expect("samples enough").relative;
+            println!("| {name} | {words} | {:.3} s | {:.3} % |", film.seconds, 100.0 * error);
+        }
+    }
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let place = arguments.iter().position(|a| a == "--trials");
+    let trials = place.and_then(|i| arguments.get(i + 1)?.parse().ok()).unwrap_or(100);
+    plans();
+    println!();
+    targets(trials);
+    deadlines(trials);
+}
