@@ -97,6 +97,17 @@ fn every_column_of_a_csv_finds_its_place() {
 }
 
 #[test]
+fn what_channels_of_a_row_share_comes_back() {
+    let head = "# quantity: brdf_cos\ntheta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,row_b,a,b,sigma_a,sigma_b,row_a\n";
+    let table = read_bytes(format!("{head}0,0,60,0,-0.2,1,2,0.1,0.25,0.05\n0,0,0,0,,3,,0.1,,0.1\n").into_bytes(), None);
+    // BRDF·cosθo: the cosine of 60° is divided out of errors too.
+    let [a, b] = [0, 1].map(|c| table.row_plane(c).expect("a part"));
+    assert!((a[0] - 0.1).abs() < 1e-12 && (b[0] + 0.4).abs() < 1e-12 && a[1] == 0.1 && b[1].is_nan(), "{a:?} {b:?}");
+    let back = read_bytes(written(&table, Format::Csv).0, None);
+    assert!(same_bits(back.row.as_ref().expect("a part"), table.row.as_ref().expect("a part")));
+}
+
+#[test]
 fn masks_are_kept_by_reason_and_channel() {
     let table = fixture("masked-values.csv");
     assert_eq!((table.masked.marked, table.masked.not_finite), (1, 2));

@@ -142,6 +142,9 @@ pub struct Measurement {
     pub sigma: Option<Vec<f64>>,
     /// 1 σ of error components shared by all entries (fully correlated), each in the values' layout.
     pub common: Vec<Vec<f64>>,
+    /// The part of `sigma` that the channels of one entry share, where there is one: 1 σ, signed, fully correlated among an entry's channels and
+    /// independent of other entries, in the values' layout.
+    pub row: Option<Vec<f64>>,
     /// What each entry stands for.
     pub weights: Weights,
     /// What is masked, and why.
@@ -168,6 +171,7 @@ impl Measurement {
             values,
             sigma: None,
             common: Vec::new(),
+            row: None,
             weights: Weights::Uniform,
             masked: Masked::default(),
             evaluator: None,
@@ -207,6 +211,13 @@ impl Measurement {
     pub fn sigma_plane(&self, channel: usize) -> Option<&[f64]> {
         let n = self.len();
         self.sigma.as_ref().map(|s| &s[channel * n..(channel + 1) * n])
+    }
+
+    /// The part of a channel's σ that the channels of an entry share, where there is one.
+    #[must_use]
+    pub fn row_plane(&self, channel: usize) -> Option<&[f64]> {
+        let n = self.len();
+        self.row.as_ref().map(|s| &s[channel * n..(channel + 1) * n])
     }
 
     /// Shared error component `k`'s 1 σ values of one channel.

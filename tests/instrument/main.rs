@@ -17,5 +17,6 @@ mod plan;
 mod planned;
 mod presets;
 mod raw;
+mod rows;
 mod support;
 mod through;

@@ -1,6 +1,7 @@
 //! How sure the parameters are: the sandwich covariance A⁻¹ B A⁻¹, shared error components, what the data leave open, and what the
 //! residuals of neighbours say of the model's own error. One pass over the samples.
 
+mod rows;
 mod sandwich;
 mod sums;
 
@@ -90,7 +91,9 @@ pub(super) fn uncertainty(
     let sandwich = Sandwich::new(&totals.normal, &pinned, &limited(problem, at, &pinned));
     let shared: Vec<_> = totals.common.iter().cloned().chain([totals.outliers.shared(&sandwich.bread)]).collect();
     let told_by_residuals = problem.saturation.is_some() || totals.stated.1 < n;
-    let mut spread = totals.known.clone();
+    // What is known, and between channels what a row's share.
+    let stated = &totals.known + &totals.rows;
+    let mut spread = stated.clone();
     if told_by_residuals {
         spread += &totals.by_residuals * inflation;
     }
@@ -104,7 +107,7 @@ pub(super) fn uncertainty(
     errors.iter_mut().zip(&pinned).filter(|(_, p)| **p).for_each(|(e, _)| *e = Some(0.0));
     let (reach, by_others) = match leveraged {
         Some(leveraged) => {
-            let certain = sandwich.covariance(&totals.known, &shared).diagonal();
+            let certain = sandwich.covariance(&stated, &shared).diagonal();
             (leveraged.reach(&certain, &covariance.diagonal(), freedom), leveraged.by_others(&certain))
         }
         None => (vec![student_quantile(0.975, freedom.max(1.0)); pinned.len()], Vec::new()),

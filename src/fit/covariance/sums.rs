@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::rows::Rows;
 use crate::fit::folded::{OnLines, Products, Residuals};
 use crate::fit::loss::Datum;
 use crate::fit::merl_lines::{Line, MerlLines};
@@ -32,6 +33,8 @@ pub(super) struct Totals {
     pub drawn: DMatrix<f64>,
     /// Σ g gᵀ over clusters of neighbours, and how many there are.
     pub clusters: (DMatrix<f64>, usize),
+    /// What errors that the channels of a row share add to B: its products of different channels.
+    pub rows: DMatrix<f64>,
     pub common: Vec<DVector<f64>>,
     pub outliers: Outliers,
     pub neighbours: Neighbours,
@@ -52,7 +55,8 @@ impl Totals {
             known: zero.clone(),
             by_residuals: zero.clone(),
             drawn: zero.clone(),
-            clusters: (zero, 0),
+            clusters: (zero.clone(), 0),
+            rows: zero,
             common: vec![DVector::zeros(parameters); problem.samples.measurement.common.len()],
             outliers: Outliers::new(parameters),
             neighbours: Neighbours::default(),
@@ -74,6 +78,7 @@ impl Totals {
             piece.close();
             totals.clusters.0 += &piece.clusters;
             totals.clusters.1 += piece.count;
+            totals.rows += &piece.rows.sums;
             for (c, sums) in piece.channels.iter().enumerate() {
                 totals.add(problem, at, c, sums);
             }
@@ -138,6 +143,7 @@ struct Piece {
     /// Σ over clusters of neighbours of the outer product of their pull on the parameters.
     clusters: DMatrix<f64>,
     count: usize,
+    rows: Rows,
     residuals: Residuals,
 }
 
@@ -162,7 +168,8 @@ impl Piece {
             tallied: Tallied::new(k),
         };
         let clusters = DMatrix::zeros(parameters, parameters);
-        Self { channels: vec![sums; channels], clusters, count: 0, residuals: Residuals::default() }
+        let (rows, residuals) = (Rows::new(parameters), Residuals::default());
+        Self { channels: vec![sums; channels], clusters, count: 0, rows, residuals }
     }
 
     /// Adds all sums over one block; `bread` says whether A is among them, `gross` from which residual one is an outlier.
@@ -179,6 +186,7 @@ impl Piece {
             sums.dark |= block.x.iter().zip(w).any(|(x, w)| *x == f64::NEG_INFINITY && *w > 0.0);
             let gradient = sums.add(problem, block, c, scratch, bread);
             sums.outliers.add(scratch, (w, pairs), gross);
+            self.rows.take(problem, block, c, scratch);
             let (strength, place) = (problem.strength(x), problem.place(channels, c));
             if clusters.len() == 1 {
                 place.iter().enumerate().for_each(|(i, p)| scores[0][*p] += strength[i] * gradient[i]);
@@ -191,6 +199,7 @@ impl Piece {
                 }
             }
         }
+        self.rows.close(problem, at, &mut self.residuals.scratch);
         scores.iter().for_each(|s| self.clusters.ger(1.0, s, s, 1.0));
         self.count += clusters.len();
     }

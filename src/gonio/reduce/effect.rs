@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::alike::alike;
 use super::bend::{self, Bend};
 use super::positions::{Off, Optics, net};
 use super::shared::{JITTER, Shared};
@@ -35,6 +36,12 @@ impl Effect {
     fn share(&self, kept: usize) -> f64 {
         let (linear, bent) = self.variances(kept);
         bent / (linear + bent)
+    }
+
+    /// What each axis' jitter does, 1 σ: in proportion, and by its square.
+    fn of_stop(&self, kept: usize) -> Vec<f64> {
+        let factor = self.factor(kept).sqrt();
+        self.parts[kept..].iter().flat_map(|(u, q)| [factor * u, factor * 3f64.sqrt() * q]).collect()
     }
 
     /// The factor of both that makes them the whole.
@@ -102,6 +109,12 @@ pub(super) fn draw(
     let whole = spread::variances(optics, pair, (errors, heights), &relative, model, values);
     let bent = effects.iter_mut().zip(whole).filter(|(e, _)| e.share(kept(errors)) > BENT);
     bent.for_each(|(e, v)| e.whole = Some(v));
+}
+
+/// Notes what jitter does to all channels of a reading alike, whose `list` are its places and effects.
+pub(super) fn place_of_stop(list: &[(usize, Effect)], kept: usize, shared: &mut Shared<'_>) {
+    let patterns: Vec<Vec<f64>> = list.iter().map(|(_, effect)| effect.of_stop(kept)).collect();
+    list.iter().zip(alike(&patterns)).for_each(|((place, _), u)| shared.add_of_stop(*place, u));
 }
 
 /// Puts effects on readings of these places where they belong: what readings share into components, the rest into each one's own.

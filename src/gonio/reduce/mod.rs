@@ -4,6 +4,7 @@
 //! reference's, b and r interpolated between the visits before and after. Without a reference the gain is taken as stated. What is
 //! measured is f averaged over the cones of source and aperture, weighed by cosθo: ⟨f cosθo⟩/⟨cosθo⟩.
 
+mod alike;
 mod bend;
 mod budget;
 mod effect;
@@ -186,6 +187,7 @@ impl Work<'_> {
             positions::add(self.raw, self.instrument, model, &table, &mut shared);
         }
         let budget = shared.budget(&table);
+        let row = shared.row(&table, width).filter(|_| self.instrument.is_noisy());
         shared.own_into(&mut table);
         let mut notes = left.notes(width);
         if model.is_none() && positions::matter(self.instrument) {
@@ -202,6 +204,7 @@ impl Work<'_> {
             masked: Masked { marked, ..Masked::default() },
             sigma: self.instrument.is_noisy().then(|| table.sigma()),
             common: shared.planes(),
+            row,
             ..Measurement::new(name, self.raw.directions.clone(), self.raw.channels.clone(), table.values)
         };
         Reduction { measurement, budget }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::Table;
 use super::bend::pairs;
-use super::effect::{Effect, draw, effects, is_bent, kept, place_all};
+use super::effect::{Effect, draw, effects, is_bent, kept, place_all, place_of_stop};
 use super::shared::{HEIGHT, JITTER, Shared, TILT, ZEROS};
 use super::spread::Heights;
 use crate::geometry::angles::turned;
@@ -276,10 +276,14 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
             draw(list, &optics, pair, (&errors, &heights), &reference, model, &values(*entry));
         });
     }
-    let of_channels = valid
-        .iter()
-        .zip(effects)
-        .flat_map(|(entry, list)| list.into_iter().enumerate().map(move |(c, effect)| (c * n + entry, effect)));
-    let placed: Vec<(usize, Effect)> = of_channels.filter(|(place, _)| table.values[*place].is_finite()).collect();
+    let (kept, mut placed) = (kept(&errors), Vec::with_capacity(n * width));
+    for (entry, list) in valid.iter().zip(effects) {
+        let of_channels = list.into_iter().enumerate().map(|(c, effect)| (c * n + entry, effect));
+        let of_entry: Vec<(usize, Effect)> = of_channels.filter(|(p, _)| table.values[*p].is_finite()).collect();
+        if of_entry.len() > 1 && kept < errors.len() {
+            place_of_stop(&of_entry, kept, shared);
+        }
+        placed.extend(of_entry);
+    }
     place_all(&placed, &errors, shared);
 }

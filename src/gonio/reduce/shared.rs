@@ -4,6 +4,7 @@
 //! reading, fully correlated. Visits are many in a long scan, and components cost memory, so g visits in a row may be one: then a share 1/g
 //! of the variance is common and the rest counts as each reading's own, which keeps the variance of a reading and of the mean over the group.
 
+use super::alike::alike;
 use super::budget::{Budget, Type};
 use super::visits::{Gap, Visits};
 use super::{Reduced, Table};
@@ -42,6 +43,8 @@ pub(super) struct Shared<'a> {
     /// Variance of readings that was attributed; empty for none.
     own: Vec<f64>,
     components: Vec<Component>,
+    /// What jitter does to all channels of a reading alike, 1 σ; empty for nothing.
+    of_stops: Vec<f64>,
     /// Component of (family, group of visits, channel or mode).
     places: std::collections::HashMap<(usize, usize, usize), usize>,
     /// Visits that are one component.
@@ -91,6 +94,7 @@ impl<'a> Shared<'a> {
             families,
             own: Vec::new(),
             components: Vec::new(),
+            of_stops: Vec::new(),
             places: std::collections::HashMap::new(),
             group: visits.len().div_ceil(afforded).max(1),
             has_reference: visits.has[1],
@@ -121,6 +125,32 @@ impl<'a> Shared<'a> {
         let mut plane = vec![0.0; self.size];
         of.for_each(|(place, u)| plane[place] = u);
         self.components.push(Component { family: None, plane });
+    }
+
+    /// Adds what a stop's errors do to all channels of a reading alike; it is in their own variance already.
+    pub fn add_of_stop(&mut self, place: usize, u: f64) {
+        add_at(&mut self.of_stops, self.size, place, u);
+    }
+
+    /// The part of each reading's own σ that its channels share, channel-major: what a stop does, and drift between visits. None where there is no such
+    /// part.
+    pub fn row(&self, table: &Table, width: usize) -> Option<Vec<f64>> {
+        let entries = self.size / width.max(1);
+        let part = |family: usize, place: usize| self.families[family].own.get(place).copied().unwrap_or(0.0).sqrt();
+        let parts = |place: usize| {
+            let drift = part(DRIFT, place).copysign(table.values[place]);
+            [self.of_stops.get(place).copied().unwrap_or(0.0), drift, part(DARK, place)]
+        };
+        let is_there = width > 1 && (0..self.size).any(|place| parts(place).iter().any(|u| *u != 0.0));
+        let mut row = vec![0.0; if is_there { self.size } else { 0 }];
+        for entry in 0..if is_there { entries } else { 0 } {
+            let places = (0..width).map(|c| c * entries + entry);
+            let valid: Vec<usize> = places.filter(|place| table.values[*place].is_finite()).collect();
+            let patterns: Vec<Vec<f64>> = valid.iter().map(|place| parts(*place).to_vec()).collect();
+            valid.iter().zip(alike(&patterns)).for_each(|(place, u)| row[*place] = u);
+        }
+        let masked = |(u, value): (f64, &f64)| if value.is_nan() { f64::NAN } else { u };
+        is_there.then(|| row.into_iter().zip(&table.values).map(masked).collect())
     }
 
     /// Adds a variance of a reading's own that belongs to several families, whose parts are attributed.

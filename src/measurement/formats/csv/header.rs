@@ -31,6 +31,8 @@ pub(super) struct Columns {
     pub(super) sigma: Vec<usize>,
     /// For each shared component, one for each channel.
     pub(super) common: Vec<Vec<usize>>,
+    /// Empty, or one for each channel.
+    pub(super) row: Vec<usize>,
     pub(super) weight: Option<usize>,
 }
 
@@ -112,8 +114,13 @@ impl Columns {
         let of_channels = OfChannels::new(line, &names, &channels);
         let sigma = of_channels.columns("sigma_", &with_prefix(&names, "sigma_"))?;
         let common = shared_components(&of_channels, &names)?;
+        let row = of_channels.columns("row_", &with_prefix(&names, "row_"))?;
+        if let (Some(&first), true) = (row.first(), sigma.is_empty()) {
+            let expected = "sigma_… beside row_…, which is the part of it that the channels of a row share";
+            return Err(line.invalid("header", expected, quoted(&names[first])));
+        }
         let weight = find("weight");
-        Ok(Self { names, angles, channels, sigma, common, weight })
+        Ok(Self { names, angles, channels, sigma, common, row, weight })
     }
 
     /// Names of the channels.

@@ -2,7 +2,7 @@
 //!
 //! Columns stand in any order: `theta_i_deg`, `phi_i_deg`, `theta_o_deg`, `phi_o_deg`; one per channel, under any other name, in 1/sr; `sigma_<channel>`
 //! (≥ 0, 0 is exact), for every channel or none; `common_<k>_<channel>` (1 σ, signed; k in plain digits), component by component
-//! for every channel;
+//! for every channel; `row_<channel>` (1 σ, signed, no more than the row's `sigma_<channel>`), the part of σ that the channels of a row share;
 //! `weight` (≥ 0). An empty value is masked as not measured, `nan` and `inf` as not finite. Comments that mean something:
 //!
 //! - `# quantity: brdf` (default) or `brdf_cos`;
@@ -43,6 +43,6 @@ const SOLID_ANGLE: &str = "solid-angle";
 /// Whether a column of this name is anything but a channel: such a name can't be given to a channel.
 pub(crate) fn is_reserved(name: &str) -> bool {
     const RAW: [&str; 4] = ["kind", "time_s", "exposure_s", "repeat"];
-    const PREFIXES: [&str; 5] = ["theta_", "phi_", "sigma_", "common_", "signal_"];
+    const PREFIXES: [&str; 6] = ["theta_", "phi_", "sigma_", "common_", "row_", "signal_"];
     name.is_empty() || name == "weight" || RAW.contains(&name) || PREFIXES.iter().any(|p| name.starts_with(p))
 }

@@ -80,6 +80,7 @@ struct Table<'a> {
     read: usize,
     sigma: Vec<Vec<f64>>,
     common: Vec<Vec<Vec<f64>>>,
+    row: Vec<Vec<f64>>,
     weight: Vec<f64>,
 }
 
@@ -94,6 +95,7 @@ impl<'a> Table<'a> {
             read: 0,
             sigma: vec![Vec::new(); columns.sigma.len()],
             common: vec![vec![Vec::new(); channels]; columns.common.len()],
+            row: vec![Vec::new(); columns.row.len()],
             weight: Vec::new(),
         }
     }
@@ -193,6 +195,12 @@ impl<'a> Table<'a> {
                 if valid { error_of(line, &columns.label(column), cell(column), not_negative)? } else { f64::NAN };
             sigma.push(divisor.apply(value));
         }
+        if let (Some(row), Some(&column)) = (self.row.get_mut(channel), columns.row.get(channel)) {
+            let sigma = columns.sigma.get(channel).map_or(0.0, |&sigma| cell(sigma).parse().unwrap_or(0.0));
+            let part = |line: Line<'_>, label: &str, text: &str| part_of(line, label, text, sigma);
+            let value = if valid { error_of(line, &columns.label(column), cell(column), part)? } else { f64::NAN };
+            row.push(divisor.apply(value));
+        }
         for (component, of_channel) in self.common.iter_mut().zip(&columns.common) {
             if let (Some(common), Some(&column)) = (component.get_mut(channel), of_channel.get(channel)) {
                 let finite = |line: Line<'_>, column: &str, text: &str| line.finite(column, text);
@@ -212,6 +220,7 @@ impl<'a> Table<'a> {
         };
         measurement.sigma = (!self.sigma.is_empty()).then(|| concat(self.sigma));
         measurement.common = self.common.into_iter().map(concat).collect();
+        measurement.row = (!self.row.is_empty()).then(|| concat(self.row));
         measurement.weights = match (self.columns.weight, self.comments.grid) {
             (Some(_), _) if self.comments.solid_angle => Weights::SolidAngle(self.weight),
             (Some(_), _) => Weights::Column(self.weight),
@@ -222,6 +231,9 @@ impl<'a> Table<'a> {
         measurement
     }
 }
+
+/// By how much a part may exceed the whole: what rounding to three digits makes of the same number twice.
+const DIGITS: f64 = 1e-2;
 
 /// The stated error of a value that is there, read by `read`.
 fn error_of(
@@ -235,6 +247,15 @@ fn error_of(
         return Err(line.invalid(column, expected, quoted(text)));
     }
     read(line, column, text)
+}
+
+/// A finite number no larger than `sigma`, whatever its sign, but for the last digits of a file of few.
+fn part_of(line: Line<'_>, column: &str, text: &str, sigma: f64) -> Result<f64, MeasurementError> {
+    let value = line.finite(column, text)?;
+    if value.abs() <= sigma * (1.0 + DIGITS) {
+        return Ok(value);
+    }
+    Err(line.invalid(column, format!("a part of sigma_…, so {sigma} at most, of either sign"), quoted(text)))
 }
 
 /// A finite number ≥ 0.

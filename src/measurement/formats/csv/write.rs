@@ -78,6 +78,9 @@ fn column_names(measurement: &Measurement) -> Vec<String> {
     for k in 1..=measurement.common.len() {
         names.extend(measurement.channels.iter().map(|channel| format!("common_{k}_{channel}")));
     }
+    if measurement.row.is_some() {
+        names.extend(measurement.channels.iter().map(|channel| format!("row_{channel}")));
+    }
     if has_weight_column(measurement) {
         names.push("weight".into());
     }
@@ -101,7 +104,8 @@ fn write_row(measurement: &Measurement, i: usize, text: &mut String) {
         }
     }
     let n = measurement.len();
-    let layers = std::iter::once(&measurement.values).chain(&measurement.sigma).chain(&measurement.common);
+    let errors = measurement.sigma.iter().chain(&measurement.common).chain(&measurement.row);
+    let layers = std::iter::once(&measurement.values).chain(errors);
     for layer in layers {
         for value in layer.iter().skip(i).step_by(n.max(1)) {
             push_number(text, *value);
