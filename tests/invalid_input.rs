@@ -12,7 +12,7 @@ use goniofit::numeric::random::{Purpose, RngExt, stream};
 /// A file of `data-fixtures/invalid`, and what its error must say of place, expected and found.
 type Broken = (&'static str, [&'static str; 3]);
 
-const CSV: [Broken; 35] = [
+const CSV: [Broken; 37] = [
     ("csv-text-for-number.csv", ["line 3, column r", "expected a number", "found \"bright\""]),
     ("csv-text-for-angle.csv", ["line 2, column theta_o_deg", "expected a number", "found \"ten\""]),
     ("csv-extra-column.csv", ["line 3", "expected 5 cells", "found 6"]),
@@ -23,6 +23,8 @@ const CSV: [Broken; 35] = [
     ("csv-tabs.csv", ["line 1, header", "separated by commas, not tabs", "found \"theta_i_deg\\tphi_i_deg"]),
     ("csv-direction-not-finite.csv", ["line 2, column theta_o_deg", "expected a finite number", "found \"nan\""]),
     ("csv-negative-sigma.csv", ["line 2, column sigma_r", "expected a number ≥ 0", "found \"-0.01\""]),
+    ("csv-row-without-sigma.csv", ["line 1, header", "expected sigma_… beside row_…", "found \"row_r\""]),
+    ("csv-row-above-sigma.csv", ["line 2, column row_r", "so 0.01 at most", "found \"-0.02\""]),
     ("csv-sigma-of-unknown-channel.csv", ["line 1, header", "the name of a channel (r)", "found \"sigma_red\""]),
     (
         "csv-sigma-missing-for-valid-value.csv",

@@ -9,6 +9,10 @@ use super::shared::{JITTER, Shared};
 use super::spread::{self, Heights};
 use crate::gonio::simulate::Truth;
 
+/// Variance of a normal error's square, over the square of its mean: what is left of jitter's once its mean is taken off.
+const SCATTER: f64 = 2.0;
+/// Share of a value beyond which a mean shift is no small correction.
+const FARTHEST: f64 = 0.3;
 /// Share of the variance from which on squares of errors call for draws: a normal interval then holds 94.6 % of an exponential flank.
 const BENT: f64 = 0.02;
 /// Share from which on they are worth knowing: a lobe's readings on both sides of its peak cancel what is in proportion.
@@ -19,6 +23,8 @@ const CURVED: f64 = 1e-4;
 #[derive(Debug)]
 pub(super) struct Effect {
     parts: Vec<(f64, f64)>,
+    /// The mean of what each axis' jitter does.
+    shifts: Vec<f64>,
     bend: Option<Bend>,
     whole: Option<f64>,
 }
@@ -27,9 +33,15 @@ impl Effect {
     /// Variances of first and second order.
     fn variances(&self, kept: usize) -> (f64, f64) {
         let linear = self.parts.iter().map(|(u, _)| u * u).sum();
-        let squares = |list: &[(f64, f64)]| list.iter().map(|(_, q)| 3.0 * q * q).sum::<f64>();
-        let bent = self.bend.as_ref().map_or_else(|| squares(&self.parts[..kept]), Bend::variance);
-        (linear, bent + squares(&self.parts[kept..]))
+        let squares = |list: &[(f64, f64)]| list.iter().map(|(_, q)| q * q).sum::<f64>();
+        let bent = self.bend.as_ref().map_or_else(|| 3.0 * squares(&self.parts[..kept]), Bend::variance);
+        (linear, bent + SCATTER * squares(&self.parts[kept..]))
+    }
+
+    /// What jitter's squares change a reading by on average: jitter blurs, and lowers a peak. A model whose change is as large as the value tells nothing.
+    pub fn shift(&self, value: f64) -> f64 {
+        let shift: f64 = self.shifts.iter().sum();
+        if shift.abs() < FARTHEST * value.abs() { shift } else { 0.0 }
     }
 
     /// What the second order has of both.
@@ -41,7 +53,7 @@ impl Effect {
     /// What each axis' jitter does, 1 σ: in proportion, and by its square.
     fn of_stop(&self, kept: usize) -> Vec<f64> {
         let factor = self.factor(kept).sqrt();
-        self.parts[kept..].iter().flat_map(|(u, q)| [factor * u, factor * 3f64.sqrt() * q]).collect()
+        self.parts[kept..].iter().flat_map(|(u, q)| [factor * u, factor * SCATTER.sqrt() * q]).collect()
     }
 
     /// The factor of both that makes them the whole.
@@ -72,13 +84,19 @@ pub(super) fn effects(
         if errors[k].0 != JITTER {
             return (u, q);
         }
-        // What moves is divided by the stops, and so is the scatter of what bends, but not its mean.
-        (u / stops.sqrt(), q * ((2.0 / stops + 1.0) / 3.0).sqrt())
+        // Several stops average what moves, and the scatter of what bends.
+        (u / stops.sqrt(), q / stops.sqrt())
     };
     let parts = |(c, value): (usize, &f64)| (0..errors.len()).map(|k| part(c, *value, k)).collect();
-    let mut effects: Vec<Effect> =
-        values.iter().enumerate().map(|of| Effect { parts: parts(of), bend: None, whole: None }).collect();
     let kept = kept(errors);
+    let shifts = |(c, value): (usize, &f64)| {
+        (kept..errors.len()).map(|k| net(scale, *value, list[k][c], reference[k]).1).collect()
+    };
+    let mut effects: Vec<Effect> = values
+        .iter()
+        .enumerate()
+        .map(|of| Effect { parts: parts(of), shifts: shifts(of), bend: None, whole: None })
+        .collect();
     if kept > 0 && effects.iter().any(|e| e.share(kept) > CURVED) {
         let alone: Vec<Vec<f64>> = list[..kept].iter().map(|of| of.iter().map(|(_, q)| *q).collect()).collect();
         let products = optics.products(pair, &errors[..kept], &alone, model, values.len());
@@ -106,7 +124,8 @@ pub(super) fn draw(
     values: &[f64],
 ) {
     let relative: Vec<f64> = reference.iter().map(|(u, _)| *u).collect();
-    let whole = spread::variances(optics, pair, (errors, heights), &relative, model, values);
+    let shifts: Vec<f64> = effects.iter().zip(values).map(|(e, value)| e.shift(*value)).collect();
+    let whole = spread::variances(optics, pair, (errors, heights), &relative, model, (values, &shifts));
     let bent = effects.iter_mut().zip(whole).filter(|(e, _)| e.share(kept(errors)) > BENT);
     bent.for_each(|(e, v)| e.whole = Some(v));
 }
@@ -124,7 +143,7 @@ pub(super) fn place_all(list: &[(usize, Effect)], errors: &[Off], shared: &mut S
         let factor = effect.factor(kept);
         for (k, ((family, _, _), (u, q))) in errors.iter().zip(&effect.parts).enumerate() {
             if k >= kept {
-                shared.add_own(*family, *place, factor * (u * u + 3.0 * q * q));
+                shared.add_own(*family, *place, factor * (u * u + SCATTER * q * q));
                 continue;
             }
             shared.add(*family, (k, 0), *place, factor.sqrt() * u);

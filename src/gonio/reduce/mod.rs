@@ -184,7 +184,7 @@ impl Work<'_> {
             self.entry(stop, entry, &times, &mut table, &mut shared, &mut left);
         }
         if let Some(model) = model {
-            positions::add(self.raw, self.instrument, model, &table, &mut shared);
+            positions::add(self.raw, self.instrument, model, &mut table, &mut shared);
         }
         let budget = shared.budget(&table);
         let row = shared.row(&table, width).filter(|_| self.instrument.is_noisy());

@@ -1,7 +1,8 @@
 //! Errors of positions: what a reading changes by when axes, tilt or height are off by their uncertainties, by a model of what is read.
 //!
 //! Each error is moved by ± its σ. Half the difference is the component u, the same error in all readings (of jitter: each reading's own); the
-//! average of both less the value in the middle, q, is what the error's square does: its mean square is 3 q². Squares of kept errors, and products of
+//! average of both less the value in the middle, q, is what the error's square does: its mean square is 3 q². Jitter's mean is known, Σ q, and taken off
+//! each reading: 2 q² is left. Squares of kept errors, and products of
 //! two, have patterns that readings share, a lobe that is broader or lower: [`super::bend`]. Where they matter the errors' effect is no normal
 //! distribution: there [`super::spread`] draws them all, and the variance is that of the normal distribution whose 95 % interval is as wide.
 //!
@@ -246,8 +247,8 @@ fn approaches(raw: &Raw) -> Vec<f64> {
     count
 }
 
-/// Adds what errors of positions do to every reading. `model` is what is read, about.
-pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: &Table, shared: &mut Shared<'_>) {
+/// Adds what errors of positions do to every reading, and takes off what jitter does on average. `model` is what is read, about.
+pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: &mut Table, shared: &mut Shared<'_>) {
     let errors = errors(instrument, raw.dimension);
     if errors.is_empty() {
         return;
@@ -286,4 +287,8 @@ pub(super) fn add(raw: &Raw, instrument: &Instrument, model: &Truth<'_>, table: 
         placed.extend(of_entry);
     }
     place_all(&placed, &errors, shared);
+    for (place, effect) in &placed {
+        let value = &mut table.values[*place];
+        *value -= effect.shift(*value);
+    }
 }

@@ -62,14 +62,15 @@ fn pose(errors: &[Off], draw: &[f64; MOST]) -> Pose {
     errors.iter().zip(draw).fold(Pose::default(), |sum, ((_, of, sigma), z)| sum.plus(&of(z * sigma)))
 }
 
-/// The variance that stands for all errors of one reading together, channel by channel; `relative` is what each does to the reference.
+/// The variance that stands for all errors of one reading together, channel by channel; `relative` is what each does to the reference,
+/// `shifts` what the reading is corrected by on average.
 pub(super) fn variances(
     optics: &Optics<'_>,
     pair: (DVec3, DVec3),
     (errors, heights): (&[Off], &Heights),
     relative: &[f64],
     model: &Truth<'_>,
-    values: &[f64],
+    (values, shifts): (&[f64], &[f64]),
 ) -> Vec<f64> {
     let width = values.len();
     let still = optics.flux(pair, &Pose::default(), model, width);
@@ -79,7 +80,7 @@ pub(super) fn variances(
         let of_reference: f64 = draw.iter().zip(relative).map(|(z, r)| z * r).sum();
         let read = optics.flux(pair, &pose(errors, draw), model, width);
         for (c, list) in changes.iter_mut().enumerate() {
-            list.push((heights[c] * per_flux * (read[c] - still[c]) - values[c] * of_reference).abs());
+            list.push((heights[c] * per_flux * (read[c] - still[c]) - shifts[c] - values[c] * of_reference).abs());
         }
     }
     changes.into_iter().map(|list| (quantile(list, 0.95) / normal_quantile(0.975)).powi(2)).collect()
