@@ -6,6 +6,9 @@ use nalgebra::DMatrix;
 /// signed, channel by channel. It has no more variance in any channel than all errors together.
 pub(super) fn alike(patterns: &[Vec<f64>]) -> Vec<f64> {
     let errors = patterns.first().map_or(0, Vec::len);
+    if errors == 0 {
+        return vec![0.0; patterns.len()];
+    }
     // Channels count alike, however bright they are.
     let scale = |pattern: &Vec<f64>| {
         let size = pattern.iter().map(|u| u * u).sum::<f64>().sqrt();
