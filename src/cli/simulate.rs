@@ -137,7 +137,7 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     let job = Job { left_out: &left_out, ..job };
     let affordable = args.time_budget.map(|time| job.affordable(time));
     let accuracy = affordable.map_or(job.accuracy, |a| a.accuracy);
-    let raw = Job { accuracy, ..job }.run(ui.control());
+    let raw = Job { accuracy, ..job }.run_until(affordable.map(|a| a.deadline), ui.control());
     let error = raw.quadrature_error;
     (raw, How { spared, affordable, error, accuracy })
 }
@@ -146,8 +146,10 @@ impl How {
     /// Says where what was asked for could not be reached.
     fn warn(&self, ui: &Ui) {
         if self.error > self.accuracy {
+            let why =
+                if self.affordable.is_some() { "their orders or the time end there" } else { "their orders end there" };
             ui.warn(&format!(
-                "means over cones are good to {:.1e} at worst, not to {:e}: their orders end there",
+                "means over cones are good to {:.1e} at worst, not to {:e}: {why}",
                 self.error, self.accuracy
             ));
         }

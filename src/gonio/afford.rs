@@ -13,9 +13,12 @@ const BEFORE: usize = 8;
 /// Share of the time that trials may take.
 const TRIALS: f64 = 0.2;
 /// Accuracies that are tried, each a step finer; the first takes the lowest orders that there are.
-const COARSEST: f64 = 0.3;
+pub(super) const COARSEST: f64 = 0.3;
 const STEP: f64 = 0.1f64;
 const FINEST: f64 = 1e-12;
+
+/// Times are no longer than that, so that they can be added.
+const LONGEST: Duration = Duration::from_secs(100 * 365 * 86400);
 
 /// What a time allows.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -26,6 +29,25 @@ pub struct Affordable {
     pub predicted_s: f64,
     /// Whether they fit; if not, the accuracy is the coarsest.
     pub fits: bool,
+    /// When readings have to be done that trials mistake: from then on the rest takes the lowest orders.
+    #[serde(skip)]
+    pub deadline: Deadline,
+}
+
+/// When all readings have to be made, and how long one takes with the lowest orders.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deadline {
+    end: Instant,
+    each_s: f64,
+    readings: usize,
+}
+
+impl Deadline {
+    /// Whether those from number `next` on are late unless they take the lowest orders.
+    pub(super) fn presses(&self, next: usize) -> bool {
+        let left = self.each_s * self.readings.saturating_sub(next) as f64;
+        self.end.saturating_duration_since(Instant::now()).as_secs_f64() <= left
+    }
 }
 
 impl Job<'_> {
@@ -48,7 +70,10 @@ impl Job<'_> {
             let each = start.elapsed().as_secs_f64() / read.readings.len().max(1) as f64;
             each * in_a_row(readings.len())
         };
-        let mut best = Affordable { accuracy: COARSEST, predicted_s: predict(COARSEST), fits: false };
+        let (predicted_s, count) = (predict(COARSEST), readings.len());
+        let each_s = predicted_s / count.max(1) as f64;
+        let deadline = Deadline { end: clock + time.min(LONGEST), each_s, readings: count };
+        let mut best = Affordable { accuracy: COARSEST, predicted_s, fits: false, deadline };
         best.fits = best.predicted_s + clock.elapsed().as_secs_f64() <= budget;
         let mut accuracy = COARSEST * STEP;
         while best.fits && accuracy >= FINEST && clock.elapsed().as_secs_f64() < TRIALS * budget {
@@ -56,7 +81,7 @@ impl Job<'_> {
             if predicted_s + clock.elapsed().as_secs_f64() > budget {
                 break;
             }
-            best = Affordable { accuracy, predicted_s, fits: true };
+            best = Affordable { accuracy, predicted_s, fits: true, deadline };
             accuracy *= STEP;
         }
         drop(kept);

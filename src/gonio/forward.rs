@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::actual::Actual;
+use super::afford::Deadline;
 use super::effects::light::reference_pair;
 use super::effects::{self, Block, Maker};
 use super::instrument::Instrument;
@@ -64,8 +65,14 @@ impl Job<'_> {
     /// Reads all pairs of directions above the horizon, with this instrument's own errors.
     #[must_use]
     pub fn run(&self, control: Control<'_>) -> Raw {
+        self.run_until(None, control)
+    }
+
+    /// As [`Job::run`]; readings that would be late take the lowest orders, as [`Raw::quadrature_error`] says.
+    #[must_use]
+    pub fn run_until(&self, deadline: Option<Deadline>, control: Control<'_>) -> Raw {
         let (readings, actual) = self.prepare();
-        self.read(readings, &actual, control)
+        self.read_until(readings, &actual, deadline, control)
     }
 
     /// The readings that are to be made, and what the instrument is really like.
@@ -78,8 +85,18 @@ impl Job<'_> {
     /// Reads everything by an instrument with the errors `actual`. Where the work is stopped what comes back is the beginning of the run, up to the last
     /// pair of directions after a whole visit, and a note says so.
     #[must_use]
-    pub fn read(&self, mut readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
-        let passes = effects::passes(&Maker { stop: control.stop, ..self.maker(actual) }, self.left_out);
+    pub fn read(&self, readings: Vec<Reading>, actual: &Actual, control: Control<'_>) -> Raw {
+        self.read_until(readings, actual, None, control)
+    }
+
+    fn read_until(
+        &self,
+        mut readings: Vec<Reading>,
+        actual: &Actual,
+        deadline: Option<Deadline>,
+        control: Control<'_>,
+    ) -> Raw {
+        let passes = effects::passes(&Maker { stop: control.stop, deadline, ..self.maker(actual) }, self.left_out);
         let (n, width) = (readings.len(), self.channels.len());
         control.progress.start("reading", n as u64);
         let next = AtomicUsize::new(0);
@@ -122,7 +139,7 @@ impl Job<'_> {
     pub(super) fn maker<'b>(&'b self, actual: &'b Actual) -> Maker<'b> {
         let Self { truth, lobes, channels, instrument, seed, accuracy, dimension, .. } = *self;
         let stop = Control::silent().stop;
-        Maker { instrument, dimension, channels, actual, truth, lobes, seed, accuracy, stop }
+        Maker { instrument, dimension, channels, actual, truth, lobes, seed, accuracy, stop, deadline: None }
     }
 
     /// Readings with these signals.

@@ -31,7 +31,7 @@ mod travel;
 
 pub use actual::Actual;
 pub use adaptive::{Adaptive, Look, adapt, least_step_deg};
-pub use afford::Affordable;
+pub use afford::{Affordable, Deadline};
 pub use contribution::{Change, Contribution, Contributions};
 pub use cost::{hours, seconds};
 pub use effects::plan;

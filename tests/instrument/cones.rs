@@ -232,3 +232,31 @@ fn the_time_of_readings_is_told_without_what_is_made_once() {
     println!("predicted {} s, took {seconds} s", affordable.predicted_s);
     assert!(affordable.predicted_s < 0.1 + 5.0 * seconds, "{affordable:?} {seconds}");
 }
+
+/// Readings that would be late take the lowest orders, and the error that is stated is theirs; where there is time nothing changes.
+#[test]
+fn what_would_be_late_takes_the_lowest_orders() {
+    use goniofit::control::Control;
+    use std::time::Duration;
+    let instrument = goniofit::gonio::Instrument {
+        detector: goniofit::gonio::parts::Detector { aperture_deg: 3.0, ..Default::default() },
+        ..goniofit::gonio::Instrument::noiseless()
+    };
+    crate::support::with_job(
+        &crate::support::material(0.2, 0.1, 500.0),
+        &instrument,
+        &crate::support::in_plane(10.0),
+        0,
+        &[],
+        |job| {
+            let [late, ample] =
+                [Duration::from_nanos(1), Duration::from_secs(3600)].map(|t| job.affordable(t).deadline);
+            let coarse = goniofit::gonio::Job { accuracy: 0.3, ..*job }.run(Control::silent());
+            let [late, ample] = [late, ample].map(|deadline| job.run_until(Some(deadline), Control::silent()));
+            let fine = job.run(Control::silent());
+            assert!(late.signal == coarse.signal && late.quadrature_error == coarse.quadrature_error);
+            assert!(ample.signal == fine.signal && fine.signal != coarse.signal);
+            assert!(late.quadrature_error > fine.quadrature_error);
+        },
+    );
+}

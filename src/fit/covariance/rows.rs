@@ -50,13 +50,13 @@ impl Rows {
                 let mut products = DMatrix::zeros(k, k);
                 scratch.tally(k, &mut DVector::zeros(k), &mut products);
                 products.fill_upper_triangle_with_lower_triangle();
-                self.add(&products, parts(a), parts(b));
+                self.add(&products, &parts(a), &parts(b));
             }
         }
     }
 
     /// Adds the products of bare columns of two channels, both ways.
-    fn add(&mut self, products: &DMatrix<f64>, a: (Vec<f64>, Vec<usize>), b: (Vec<f64>, Vec<usize>)) {
+    fn add(&mut self, products: &DMatrix<f64>, a: &(Vec<f64>, Vec<usize>), b: &(Vec<f64>, Vec<usize>)) {
         for (i, (strength_a, place_a)) in a.0.iter().zip(&a.1).enumerate() {
             for (j, (strength_b, place_b)) in b.0.iter().zip(&b.1).enumerate() {
                 let more = strength_a * strength_b * products[(i, j)];

@@ -11,6 +11,7 @@ use super::cone::Cones;
 use super::{Block, Maker, Pass};
 use crate::brdf::{LobeTerm, Material};
 use crate::control::Stop;
+use crate::gonio::afford::{COARSEST, Deadline};
 use crate::gonio::parts::Reference;
 use crate::gonio::reading::Kind;
 use crate::gonio::sight;
@@ -31,8 +32,10 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     if source == 0.0 && detector == 0.0 {
         return Box::new(light);
     }
-    let cones = Cones::new(source, detector, maker.accuracy, maker.dimension);
-    Box::new(Spread { light, cones, lobes: Lobes::of(maker, (source, detector)), stop: maker.stop })
+    let cones = |accuracy: f64| Cones::new(source, detector, accuracy, maker.dimension);
+    let late = maker.deadline.map(|deadline| (deadline, cones(COARSEST)));
+    let lobes = Lobes::of(maker, (source, detector));
+    Box::new(Spread { light, cones: cones(maker.accuracy), late, lobes, stop: maker.stop })
 }
 
 /// A truth that is a sum of lobes, of which means over both cones are known without a sum over directions.
@@ -55,11 +58,19 @@ impl<'a> Lobes<'a> {
     }
 
     /// Writes the mean of f·cosθo times `gain` where it is known, and returns its error; that of `sum` where it is not as good as is asked for, and the sum is
-    /// better.
-    fn mean(&self, wi: DVec3, wo: DVec3, gain: f64, out: &mut [f64], mut sum: impl FnMut(&mut [f64]) -> f64) -> f64 {
+    /// better;
+    /// there is no time for a sum where it is late.
+    fn mean(
+        &self,
+        (wi, wo): (DVec3, DVec3),
+        gain: f64,
+        is_late: bool,
+        out: &mut [f64],
+        mut sum: impl FnMut(&mut [f64]) -> f64,
+    ) -> f64 {
         let Some(error) = self.cones.write_flux(self.material, wi, wo, out) else { return sum(out) };
         out.iter_mut().for_each(|value| *value *= gain);
-        if error <= self.accuracy {
+        if error <= self.accuracy || is_late {
             return error;
         }
         let mut summed = vec![0.0; out.len()];
@@ -138,6 +149,8 @@ impl Pass for Light<'_> {
 struct Spread<'a> {
     light: Light<'a>,
     cones: Cones,
+    /// What counts for readings that would be late.
+    late: Option<(Deadline, Cones)>,
     lobes: Option<Lobes<'a>>,
     stop: &'a Stop,
 }
@@ -159,10 +172,12 @@ impl Pass for Spread<'_> {
             let here = Some((reading.kind, block.wi[i], block.wo[i]));
             if here != last {
                 let (wi, wo) = (block.wi[i], block.wo[i]);
-                let mut sum = |out: &mut [f64]| self.cones.mean(wi, wo, &mut add, out);
+                let late = self.late.as_ref().filter(|(deadline, _)| deadline.presses(block.first + i));
+                let cones = late.map_or(&self.cones, |(_, coarse)| coarse);
+                let mut sum = |out: &mut [f64]| cones.mean(wi, wo, &mut add, out);
                 let lobes = self.lobes.as_ref().filter(|_| reading.kind == Kind::Sample);
                 let error = match lobes {
-                    Some(lobes) => lobes.mean(wi, wo, gain, &mut out, sum),
+                    Some(lobes) => lobes.mean((wi, wo), gain, late.is_some(), &mut out, sum),
                     None => sum(&mut out),
                 };
                 block.error = block.error.max(error);

@@ -26,6 +26,7 @@ mod zero;
 use glam::DVec3;
 
 use super::actual::Actual;
+use super::afford::Deadline;
 use super::instrument::Instrument;
 use super::reading::Reading;
 use super::simulate::Truth;
@@ -89,6 +90,8 @@ pub(super) struct Maker<'a> {
     pub accuracy: f64,
     /// Looked at between readings where one takes long.
     pub stop: &'a Stop,
+    /// When means over cones have to be done, where that is asked for.
+    pub deadline: Option<Deadline>,
 }
 
 /// The effect of a file: its name, and whether and why an instrument calls for it in these channels.
