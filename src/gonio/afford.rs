@@ -18,7 +18,7 @@ const STEP: f64 = 0.1f64;
 const FINEST: f64 = 1e-12;
 
 /// Times are no longer than that, so that they can be added.
-const LONGEST: Duration = Duration::from_secs(100 * 365 * 86400);
+const LONGEST: Duration = Duration::from_secs(u32::MAX as u64);
 
 /// What a time allows.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
