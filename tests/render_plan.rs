@@ -81,10 +81,10 @@ fn generated(rng: &mut Stream) -> String {
             "[[light.quad]]\ncenter = [{x:.3}, 3.5, 1]\nu = [{size:.3}, 0, 0.1]\nv = [0, 0, {size:.3}]\nradiance = [3, 4, 5]"
         );
     }
-    if lights & 24 == 24 {
+    if lights & 0b1_1000 == 0b1_1000 {
         text += "[light.environment]\nradiance = [0.3, 0.2, 0.4]\n";
     }
-    if lights & 48 == 48 {
+    if lights & 0b11_0000 == 0b11_0000 {
         text += "[[light.sphere]]\ncenter = [-3, 3, 2]\nradius = 0.4\nradiance = [5, 5, 5]\n";
     }
     text

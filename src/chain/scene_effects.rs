@@ -100,11 +100,15 @@ fn without(
     match effect {
         plan::POINT_LIGHTS => {
             let LightsSpec { point, directional, spot, .. } = &mut spec.lights;
-            (point.clear(), directional.clear(), spot.clear());
+            point.clear();
+            directional.clear();
+            spot.clear();
         }
         plan::AREA_LIGHTS => {
             let LightsSpec { quad, sphere, mesh, .. } = &mut spec.lights;
-            (quad.clear(), sphere.clear(), mesh.clear());
+            quad.clear();
+            sphere.clear();
+            mesh.clear();
         }
         plan::ENVIRONMENT => spec.lights.environment = None,
         plan::GLOSSY => materials = without_gloss(&mut spec, &materials),

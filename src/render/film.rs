@@ -174,10 +174,7 @@ impl Film {
         let errors = |i: usize| standard_errors(self.tiles.tile(i), self.tile_pixels(i));
         let errors: Vec<DVec3> = (0..self.tiles.count()).into_par_iter().flat_map_iter(errors).collect();
         let slots = || self.tiles.slots();
-        let gathered: Vec<Gathered> = match self.gathered.is_empty() {
-            true => Vec::new(),
-            false => slots().map(|slot| self.gathered[slot]).collect(),
-        };
+        let gathered: Vec<Gathered> = slots().filter_map(|slot| self.gathered.get(slot).copied()).collect();
         Image {
             width: self.width as usize,
             height: self.height as usize,
@@ -244,7 +241,7 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         seconds: 0.0,
         not_finite: 0,
         scene: scene.name.clone(),
-        plan: in_words(scene, &plan, options),
+        plan: in_words(scene, plan, options),
         seed: options.seed,
         tiles,
         pixels: filled(options, room)?,
@@ -296,7 +293,7 @@ fn filled<T: Clone + Default>(options: &Options, count: usize) -> Result<Vec<T>,
 }
 
 /// In one line, what is computed.
-fn in_words(scene: &Scene, plan: &Plan, options: &Options) -> String {
+fn in_words(scene: &Scene, plan: Plan, options: &Options) -> String {
     let lights = match options.strategy {
         Strategy::Combined => "lights sampled by position and by material",
         Strategy::MaterialOnly => "lights sampled by material",

@@ -7,7 +7,7 @@
 //! The one decision to know: everything is one-sided. A surface reflects, and a light shines, on the side that its normal points
 //! to; the other side is black and blocks light. A path is a chain of at most `max_bounces` scattering events; at each one
 //! the lights are sampled directly and the two ways to find them are combined by multiple importance sampling (Veach 1997).
-//! Every pixel has its own points ([`points`]), so the picture does not depend on the number of threads.
+//! Every pixel has its own points, so the picture does not depend on the number of threads.
 
 mod bvh;
 mod camera;

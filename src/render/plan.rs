@@ -8,6 +8,7 @@ use crate::control::{self, counted};
 
 /// What is computed for a scene. What is off is proved not to matter: the picture is that of [`Plan::FULL`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools)] // each is a switch of its own
 pub struct Plan {
     /// Something may stand between a surface and a light.
     pub shadows: bool,
@@ -52,91 +53,85 @@ impl Plan {
     }
 
     /// Scattering events of a path at most, where the scene allows `most`.
-    pub(super) fn events(&self, most: u32) -> u32 {
+    pub(super) fn events(self, most: u32) -> u32 {
         if self.interreflection { most } else { most.min(1) }
     }
 
     /// The plan in words: what is on, what is off, and why.
     #[must_use]
-    pub fn effects(&self, scene: &Scene) -> control::Plan {
+    pub fn effects(self, scene: &Scene) -> control::Plan {
         let mut plan = control::Plan::default();
         let flat = FlatScene::of(scene);
-        let shapes = || counted(scene.geometry.shapes() as u64, "shape");
-        let (shadows, interreflection) = match (&flat, self.shadows, self.interreflection) {
-            (Some(_), true, _) => (format!("{} may stand between lights and surfaces", shapes()), None),
-            (Some(_), false, _) => ("nothing can stand between a surface and a light".into(), None),
-            (None, true, _) => (format!("{} may stand between lights and surfaces", shapes()), None),
-            (None, false, _) => ("there is no light".into(), Some("there is no light")),
-        };
-        plan.push(SHADOWS, self.shadows, shadows);
-        plan.push(
-            INTERREFLECTION,
-            self.interreflection,
-            match (interreflection, self.interreflection) {
-                (Some(why), _) => why.into(),
-                (None, true) => {
-                    format!("surfaces see each other; paths of at most {} scattering events", scene.max_bounces)
-                }
-                (None, false) if scene.max_bounces <= 1 => "the scene asks for one scattering event".into(),
-                (None, false) => "one convex surface sees nothing of itself".into(),
-            },
-        );
+        let counts = |n: usize, what: &str| if n == 0 { "there is none".into() } else { counted(n as u64, what) };
         let area = scene.lights.iter().filter(|light| light.has_surface()).count();
         let points = scene.lights.len() - area;
-        let on = |n: usize, what: &str| if n == 0 { "there is none".into() } else { counted(n as u64, what) };
-        plan.push(POINT_LIGHTS, points > 0, on(points, "light"));
-        plan.push(AREA_LIGHTS, area > 0, on(area, "light"));
-        plan.push(
-            ENVIRONMENT,
-            scene.environment.is_some(),
-            match &scene.environment {
-                None => "there is none",
-                Some(Environment::Constant(_)) => "even",
-                Some(Environment::Image(_)) => "a picture, sampled by its radiance",
-            },
-        );
         let glossy = scene.materials.iter().filter(|m| is_glossy(m)).count();
-        plan.push(GLOSSY, glossy > 0, on(glossy, "material"));
-        plan.push(
-            LENS,
-            scene.camera.lens_radius > 0.0,
-            match scene.camera.lens_radius {
-                0.0 => "the camera is a pinhole".to_owned(),
-                radius => format!("radius {radius} m"),
-            },
-        );
-        plan.push(
-            "light met by chance",
-            self.chance,
-            match (self.chance, area > 0 || scene.environment.is_some()) {
-                (true, _) => "rays find lights too, weighed against aiming at them",
-                (false, true) => "closed forms give all of it",
-                (false, false) => "nothing that shines has a surface",
-            },
-        );
-        let (lights, sky) = flat.as_ref().map_or((0, false), |f| (f.closed_lights(), f.closed_environment()));
-        plan.push(
-            "closed forms",
-            self.closed_forms,
-            match (lights, sky) {
-                (0, false) if area == 0 && scene.environment.is_none() => "there is no light to integrate over".into(),
-                (0, false) => "lights may be hidden in part".to_owned(),
-                (0, true) => "one convex body in an even environment shows its directional albedo".into(),
-                (n, _) => format!(
-                    "nothing can hide {}: diffuse surfaces need no samples of it",
-                    counted(n as u64, "quad light")
-                ),
-            },
-        );
-        plan.push(
-            "packets",
-            self.packets,
-            match self.packets {
-                true => "spheres, planes and quads with sums of lobes: eight paths at a time",
-                false => "meshes, tables, pictures of light, spots or shining spheres: one path at a time",
-            },
-        );
+        let lens = scene.camera.lens_radius;
+        plan.push(SHADOWS, self.shadows, self.why_shadows(scene));
+        plan.push(INTERREFLECTION, self.interreflection, self.why_interreflection(scene));
+        plan.push(POINT_LIGHTS, points > 0, counts(points, "light"));
+        plan.push(AREA_LIGHTS, area > 0, counts(area, "light"));
+        plan.push(ENVIRONMENT, scene.environment.is_some(), why_environment(scene));
+        plan.push(GLOSSY, glossy > 0, counts(glossy, "material"));
+        let pinhole = "the camera is a pinhole".to_owned();
+        plan.push(LENS, lens > 0.0, if lens > 0.0 { format!("radius {lens} m") } else { pinhole });
+        plan.push("light met by chance", self.chance, self.why_chance(scene));
+        plan.push("closed forms", self.closed_forms, why_closed_forms(scene, flat.as_ref()));
+        plan.push("packets", self.packets, self.why_packets());
         plan
+    }
+
+    fn why_shadows(self, scene: &Scene) -> String {
+        if self.shadows {
+            return format!(
+                "{} may stand between lights and surfaces",
+                counted(scene.geometry.shapes() as u64, "shape")
+            );
+        }
+        "nothing can stand between a surface and a light".into()
+    }
+
+    fn why_interreflection(self, scene: &Scene) -> String {
+        if self.interreflection {
+            return format!("surfaces see each other; paths of at most {} scattering events", scene.max_bounces);
+        }
+        let convex = "one convex surface sees nothing of itself";
+        if scene.max_bounces <= 1 { "the scene asks for one scattering event".into() } else { convex.into() }
+    }
+
+    fn why_chance(self, scene: &Scene) -> &'static str {
+        if self.chance {
+            "rays find lights too, weighed against aiming at them"
+        } else if scene.rays_find_light() {
+            "closed forms give all of it"
+        } else {
+            "nothing that shines has a surface"
+        }
+    }
+
+    fn why_packets(self) -> &'static str {
+        if self.packets {
+            "spheres, planes and quads with sums of lobes: eight paths at a time"
+        } else {
+            "meshes, tables, pictures of light, spots or shining spheres: one path at a time"
+        }
+    }
+}
+
+fn why_environment(scene: &Scene) -> &'static str {
+    match &scene.environment {
+        None => "there is none",
+        Some(Environment::Constant(_)) => "even",
+        Some(Environment::Image(_)) => "a picture, sampled by its radiance",
+    }
+}
+
+fn why_closed_forms(scene: &Scene, flat: Option<&FlatScene<'_>>) -> String {
+    match flat.map_or((0, false), |f| (f.closed_lights(), f.closed_environment())) {
+        (0, true) => "one convex body in an even environment shows its directional albedo".into(),
+        (0, false) if !scene.rays_find_light() => "there is no light to integrate over".into(),
+        (0, false) => "lights may be hidden in part".into(),
+        (n, _) => format!("nothing can hide {}: no samples of it on diffuse surfaces", counted(n as u64, "quad light")),
     }
 }
 

@@ -249,8 +249,7 @@ fn what_would_be_late_takes_the_lowest_orders() {
         0,
         &[],
         |job| {
-            let [late, ample] =
-                [Duration::from_nanos(1), Duration::from_secs(3600)].map(|t| job.affordable(t).deadline);
+            let [late, ample] = [Duration::from_nanos(1), Duration::from_hours(1)].map(|t| job.affordable(t).deadline);
             let coarse = goniofit::gonio::Job { accuracy: 0.3, ..*job }.run(Control::silent());
             let [late, ample] = [late, ample].map(|deadline| job.run_until(Some(deadline), Control::silent()));
             let fine = job.run(Control::silent());

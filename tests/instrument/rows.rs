@@ -27,8 +27,11 @@ fn measured(channels: usize, of: &Instrument, seed: u64) -> Measurement {
     measure("m", &source, of, &Scan::InPlane { step_deg: 1.0 }, seed, Control::silent()).expect("measured")
 }
 
+/// An error in standard errors, and whether two intervals hold.
+type Judged = (f64, [bool; 2]);
+
 /// (ln n − ln N)/σ, and whether the interval of n and of the first ks hold.
-fn judged(table: &Measurement, options: &FitOptions) -> (f64, [bool; 2]) {
+fn judged(table: &Measurement, options: &FitOptions) -> Judged {
     let found = fit(table, options).expect("fitted").material;
     let record = found.fit.as_ref().expect("a record");
     let PerChannel::Shared(Some((low, high))) = record.interval_95[1].shape[0].1 else { panic!("an interval") };
@@ -42,7 +45,7 @@ fn judged(table: &Measurement, options: &FitOptions) -> (f64, [bool; 2]) {
 /// Of so many seeds: mean and root mean square of the exponent's error in standard errors, and how often intervals of n and ks hold.
 fn study(channels: usize, of: &Instrument, options: &FitOptions, seeds: u64) -> (f64, f64, [f64; 2]) {
     let all: Vec<_> = (0..seeds).into_par_iter().map(|seed| judged(&measured(channels, of, seed), options)).collect();
-    let mean = |f: &dyn Fn(&(f64, [bool; 2])) -> f64| all.iter().map(f).sum::<f64>() / seeds as f64;
+    let mean = |f: &dyn Fn(&Judged) -> f64| all.iter().map(f).sum::<f64>() / seeds as f64;
     let rms = mean(&|a| a.0 * a.0).sqrt();
     (mean(&|a| a.0), rms, [0, 1].map(|k| mean(&|a| f64::from(u8::from(a.1[k])))))
 }

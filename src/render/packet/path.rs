@@ -261,7 +261,7 @@ impl<const GLOSSY: bool> One<'_, GLOSSY> {
                 }
                 Light::Quad(quad) => {
                     if self.packets.is_closed(k) {
-                        self.add_closed(vertices, quad, state);
+                        Self::add_closed(vertices, quad, state);
                         if !GLOSSY || !(state.alive & !vertices.lobes.plain).any() {
                             continue;
                         }
@@ -300,7 +300,7 @@ impl<const GLOSSY: bool> One<'_, GLOSSY> {
 
     /// Adds what surfaces without Phong lobes reflect of a light that nothing hides.
     #[inline(always)]
-    fn add_closed<S: Simd>(&self, vertices: &Vertices<S>, light: &QuadLight, state: &mut State<S>) {
+    fn add_closed<S: Simd>(vertices: &Vertices<S>, light: &QuadLight, state: &mut State<S>) {
         let at = &vertices.at;
         let zero = state.pdf.number(0.0);
         let to_centre = at.position.vector(light.quad().center) - at.position;
