@@ -46,7 +46,7 @@ fn hard_case_lobes_in_a_white_furnace_have_a_closed_form() {
     for case in models() {
         for theta in THETAS_DEG {
             let ((want, error), (got, noise)) = (case.albedo(theta), rendered(&case.material, theta, 128, 7, true));
-            let closed = noise.max_element() < 1e-12;
+            let closed = noise.max_element() < 1e-7;
             assert!(closed || !case.name.starts_with("phong 1"), "{}: {noise}", case.name);
             if closed {
                 let near = (got - want).abs().cmple(2e-6 * want + error).all();

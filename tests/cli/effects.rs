@@ -86,7 +86,7 @@ fn what_is_no_simulation_is_said_to_be_none() {
     b.write("scene.toml", b.ok(&["scenes", "sphere", "--toml"]).out);
     b.write("colour.toml", format!("colour = 3\n{LAB}"));
     for (args, says) in [
-        (&["effects", "scene.toml"][..], "found a scene"),
+        (&["simulate", "scene.toml", "--out", "x.csv"][..], "found a scene"),
         (&["effects", "colour.toml"], "colour"),
         (&["effects", "none.toml"], "none.toml"),
         (&["effects"], "--material"),

@@ -71,8 +71,8 @@ fn a_rendered_picture_lights_another_scene_and_is_not_overwritten_by_it() {
 #[test]
 fn a_target_is_met_and_stated() {
     let b = Bench::new();
-    const BASE: [&str; 7] = ["render", "--scene", "cornell", "--size", "32", "--out", "c.exr"];
-    let with = |more: &[&'static str]| [&BASE[..], more].concat();
+    let base = ["render", "--scene", "cornell", "--size", "32", "--out", "c.exr"];
+    let with = |more: &[&'static str]| [&base[..], more].concat();
     let found = b.json(&with(&["--target-error", "8%"]));
     assert_eq!(found["target_met"], true);
     assert!(found["relative_error_95"].as_f64().is_some_and(|e| e <= 0.08), "{found}");
@@ -109,8 +109,8 @@ fn effects_of_a_scene_say_what_is_on_and_what_it_is_worth() {
 fn a_file_with_a_camera_is_a_scene_for_effects() {
     let b = Bench::new();
     b.write("s.toml", b.ok(&["scenes", "sphere", "--toml"]).out);
-    const BASE: [&str; 6] = ["effects", "s.toml", "--size", "8", "--samples", "8"];
-    let with = |more: &[&'static str]| [&BASE[..], more].concat();
+    let base = ["effects", "s.toml", "--size", "8", "--samples", "8"];
+    let with = |more: &[&'static str]| [&base[..], more].concat();
     let said = b.ok(&with(&[])).text();
     assert!(said.contains("nothing can stand between a surface and a light"), "{said}");
     let wrong = b.run(&with(&["--noiseless"]));
