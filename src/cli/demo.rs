@@ -91,11 +91,11 @@ fn describe(demo: &Demo) -> String {
     number(&mut t, "rmse of the picture", &|f| of_image(f, |c| c.rmse));
     number(&mut t, "relMSE of the picture", &|f| of_image(f, |c| c.rel_mse));
     let verdict = |f: &DemoFit| match f.image.as_ref().and_then(|c| c.significance.as_ref()) {
-        Some(s) if s.differs => "differs from the truth".to_owned(),
-        Some(_) => "equal within noise".to_owned(),
+        Some(s) if s.pixels_differing == 0 => "none".to_owned(),
+        Some(s) => format!("{:.1} %", 100.0 * s.pixels_differing as f64 / s.pixels as f64),
         None => "–".to_owned(),
     };
-    number(&mut t, "picture beside the truth's", &verdict);
+    number(&mut t, "pixels beyond their noise", &verdict);
     t.push_str("\n  times [s]  ");
     let times: Vec<String> = demo.times.iter().map(|(label, s)| format!("{label} {s:.2}")).collect();
     t.push_str(&times.join(", "));
