@@ -97,7 +97,7 @@ fn bad_targets_are_refused() {
     }
 }
 
-/// Timings decide nothing here, but that work ends and that a picture is there: `cargo bench --bench render` shows how well times are kept.
+/// Timings decide nothing here, but that work ends and that a picture is there: `cargo bench --bench render_accuracy` shows how well times are kept.
 #[test]
 fn a_time_budget_ends_the_work() {
     let start = Instant::now();

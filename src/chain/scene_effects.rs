@@ -1,5 +1,7 @@
 //! What the effects of a scene are worth: the picture without each, beside the picture with all.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 
 use super::error::ChainError;
@@ -111,7 +113,10 @@ fn without(
             mesh.clear();
         }
         plan::ENVIRONMENT => spec.lights.environment = None,
-        plan::GLOSSY => materials = without_gloss(&mut spec, &materials),
+        plan::GLOSSY => match without_gloss(&mut spec, &materials) {
+            Some(matte) => materials = matte,
+            None => return Ok(None),
+        },
         plan::LENS => spec.camera.lens_radius = 0.0,
         _ => return Ok(None),
     }
@@ -119,20 +124,21 @@ fn without(
     Ok(Some(render(&changed, Plan::of(&changed))?))
 }
 
-/// Materials with their Lambert lobes alone. Tables stay: what is glossy of them is not told apart.
-fn without_gloss(spec: &mut SceneSpec, materials: &Materials) -> Materials {
+/// Materials with their Lambert lobes alone; `None` where one is no sum of lobes, or where materials vary others, so that it can't be told what stays.
+fn without_gloss(spec: &mut SceneSpec, materials: &Materials) -> Option<Materials> {
+    if spec.materials.values().any(|m| m.variant.is_some() || m.equation.is_some()) {
+        return None;
+    }
     for material in spec.materials.values_mut().filter(|m| !m.phong.is_empty()) {
         material.phong.clear();
         material.kd = Some(material.kd.unwrap_or_default());
     }
     let matte = |material: &Material| match material {
-        Material::Brdf(brdf) => match brdf.lobes() {
-            Some(lobes) => Material::Brdf(std::sync::Arc::new(Reflectance::lambert(lobes.parts().0.to_vec()))),
-            None => material.clone(),
-        },
-        Material::PhongEquation(_) | Material::Black => material.clone(),
+        Material::Brdf(brdf) => Some(Material::Brdf(Arc::new(Reflectance::lambert(brdf.lobes()?.parts().0.to_vec())))),
+        Material::PhongEquation(_) => None,
+        Material::Black => Some(Material::Black),
     };
-    materials.iter().map(|(name, material)| (name.clone(), matte(material))).collect()
+    materials.iter().map(|(name, material)| Some((name.clone(), matte(material)?))).collect()
 }
 
 /// How far one picture is off another.

@@ -194,7 +194,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let (samples, seconds) = (image.metadata.samples.unwrap_or(0), image.metadata.seconds.unwrap_or(0.0));
     let Image { width, height, .. } = image;
     let error = image.metadata.relative_error;
-    let noise = error.map_or(String::new(), |[relative, most]| {
+    let noise = error.map_or(", relative error unknown below 2 samples".into(), |[relative, most]| {
         let percent = |x: f64| significant(100.0 * x);
         format!(", relative error {} % (95 % sure: below {} %)", percent(relative), percent(most))
     });

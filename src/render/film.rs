@@ -71,7 +71,9 @@ impl Options {
         let plan = self.plan.unwrap_or_else(|| Plan::of(scene));
         // Packets know one way to find lights, and gather no layers.
         let packets = plan.packets && self.strategy == Strategy::Combined && self.layers.is_empty();
-        Plan { packets, closed_forms: plan.closed_forms && packets, ..plan }
+        // Without closed forms light must be found.
+        let chance = if plan.closed_forms && !packets { scene.rays_find_light() } else { plan.chance };
+        Plan { packets, chance, closed_forms: plan.closed_forms && packets, ..plan }
     }
 
     /// Checks every field.

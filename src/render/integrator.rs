@@ -107,8 +107,7 @@ impl Path {
 impl<'a> Tracer<'a> {
     /// A tracer for a scene, by a plan.
     pub fn new(scene: &'a Scene, strategy: Strategy, plan: Plan) -> Self {
-        // Closed forms are the packets'; where there is none, light must be found.
-        let chance = scene.rays_find_light() && strategy != Strategy::LightsOnly;
+        let chance = plan.chance && strategy != Strategy::LightsOnly;
         Self { scene, strategy, plan: Plan { chance, ..plan }, events: plan.events(scene.max_bounces) }
     }
 

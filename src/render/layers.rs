@@ -1,5 +1,5 @@
 //! Layers of a picture beside its radiance: what the eye sees first, and how light got there. They cost nothing where none is
-//! asked for, and change no bit of the radiance where some are.
+//! asked for. Where some are, paths are followed one at a time, so that packets' scenes have other noise.
 
 use glam::DVec3;
 

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::pixel::Pixel;
 use super::tiles::Tile;
+use crate::numeric::stats::chi_square_quantile;
 
 /// A relative error counts against the radiance where it is above this share of the picture's mean, else against that.
 pub(super) const DARK: f64 = 0.1;
@@ -114,11 +115,20 @@ impl Noise {
 
     /// The picture's error.
     pub fn error(&self) -> PictureError {
-        // A pixel's channels rise and fall together, so its value is about 3V·χ² of one degree, whose square has the mean 27V⁴ and
-        // whose variance is two thirds of that. Counted twice: what the picture is off by scatters about what was to be expected too.
-        let sigma = (2.0 * 2.0 / 3.0 * self.squares).sqrt();
-        let root = |sum: f64| (sum / self.values()).sqrt();
-        PictureError { relative: root(self.sum), at_most: root(self.sum + 1.645 * sigma) }
+        let relative = (self.sum / self.values()).sqrt();
+        if self.sum <= 0.0 {
+            return PictureError { relative, at_most: relative };
+        }
+        // A pixel's channels rise and fall together, so its value is about 3V·χ² of one degree: mean square 27V², variance two thirds
+        // of that. So the sum is like χ² of 2·sum²/variance degrees (Satterthwaite 1946), at most one a pixel; halved, as what the
+        // picture is off by scatters about what was to be expected too.
+        let freedom = 0.5 * (3.0 * self.sum * self.sum / self.squares).min(self.pixels as f64);
+        let factor = if freedom < 1000.0 {
+            freedom / chi_square_quantile(0.05, freedom)
+        } else {
+            1.0 + 1.645 * (2.0 / freedom).sqrt()
+        };
+        PictureError { relative, at_most: relative * factor.sqrt() }
     }
 }
 

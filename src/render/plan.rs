@@ -33,8 +33,8 @@ impl Plan {
         match FlatScene::of(scene) {
             Some(flat) => Self::of_flat(scene, &flat),
             None => Self {
-                shadows: !scene.lights.is_empty() || scene.environment.is_some(),
-                interreflection: scene.max_bounces > 1,
+                shadows: !scene.geometry.is_one_convex() && (!scene.lights.is_empty() || scene.environment.is_some()),
+                interreflection: scene.max_bounces > 1 && !scene.geometry.is_one_convex(),
                 chance: scene.rays_find_light(),
                 closed_forms: false,
                 packets: false,
@@ -96,7 +96,11 @@ impl Plan {
             return format!("surfaces see each other; paths of at most {} scattering events", scene.max_bounces);
         }
         let convex = "one convex surface sees nothing of itself";
-        if scene.max_bounces <= 1 { "the scene asks for one scattering event".into() } else { convex.into() }
+        match scene.max_bounces {
+            0 => "the scene asks for no scattering event".into(),
+            1 => "the scene asks for one scattering event".into(),
+            _ => convex.into(),
+        }
     }
 
     fn why_chance(self, scene: &Scene) -> &'static str {

@@ -171,8 +171,8 @@ mod tests {
     fn work_ends_where_the_target_is_met_or_nothing_more_is_allowed() {
         let parts = |sum: f64| vec![Noise { sum, pixels: 256, ..Noise::default() }; 2];
         let mut plan = schedule(1e-2, &[16, 16]);
-        assert!(plan.next(&parts(0.0)).is_none() && plan.next(&parts(0.9e-4 * 768.0)).is_none());
-        assert!(plan.next(&parts(1.1e-4 * 768.0)).is_some_and(|more| more.iter().all(|n| *n > 0 && *n % PORTION == 0)));
+        assert!(plan.next(&parts(0.0)).is_none() && plan.next(&parts(0.7e-4 * 768.0)).is_none());
+        assert!(plan.next(&parts(0.9e-4 * 768.0)).is_some_and(|more| more.iter().all(|n| *n > 0 && *n % PORTION == 0)));
         plan.most = 16;
         assert!(plan.next(&parts(1.0)).is_none());
     }

@@ -158,7 +158,14 @@ fn an_adaptive_scan_is_the_run_that_chose_it_from_any_number_of_threads() {
         let source = Source::Fitted(Box::new(of.clone()));
         let table = measured(&of, &instrument, &SCAN, 5);
         let bits = |m: &Measurement| m.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&table), bits(&measured(&of, &instrument, &again(&table), 5)));
+        let listed = measured(&of, &instrument, &again(&table), 5);
+        // What jitter does on average is taken off by a surrogate of the readings, so there values agree to its digits, not to the bit.
+        let near = table
+            .values
+            .iter()
+            .zip(&listed.values)
+            .all(|(a, b)| (a - b).abs() <= 1e-4 * b.abs() || a.is_nan() && b.is_nan());
+        assert!(near && (instrument.axes.jitter_deg > 0.0 || bits(&table) == bits(&listed)), "{:?}", instrument.axes);
         for threads in [1, 8] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
             let other = pool.install(|| measured(&of, &instrument, &SCAN, 5));

@@ -18,36 +18,51 @@ use crate::numeric::simd::{Eight, LANES, Lanes, Simd};
 pub(super) fn projected_solid_angle<S: Simd>(light: &QuadLight, at: &Points3<S>) -> Lanes<S> {
     let quad = light.quad();
     let to = |a: f64, b: f64| quad.center + a * quad.u + b * quad.v;
-    let corners = [to(-1.0, -1.0), to(1.0, -1.0), to(1.0, 1.0), to(-1.0, 1.0)];
+    // Corners, each with the edge that leads to it: as differences of corners far away edges would lose their digits.
+    let corners = [
+        (to(-1.0, -1.0), -2.0 * quad.v),
+        (to(1.0, -1.0), 2.0 * quad.u),
+        (to(1.0, 1.0), 2.0 * quad.v),
+        (to(-1.0, 1.0), -2.0 * quad.u),
+    ];
     let normal = at.normal;
-    let mut from = normal.vector(corners[3]) - at.position;
+    let mut from = normal.vector(corners[3].0) - at.position;
     let mut from_z = from.dot(normal);
     let zero = from_z.number(0.0);
     let mut sum = zero;
     // Where the outline dips below the horizon and where it comes up again: at most once each.
     let (mut dips, mut rises) = (normal.vector(DVec3::ZERO), normal.vector(DVec3::ZERO));
-    for corner in corners {
+    for (corner, along) in corners {
         let to = normal.vector(corner) - at.position;
         let to_z = to.dot(normal);
         let (up, next_up) = (from_z.at_least(zero), to_z.at_least(zero));
-        let crossing = (to - from).scaled_plus(from_z / (from_z - to_z), from);
+        let along = normal.vector(along);
+        let share = from_z / (from_z - to_z);
+        let crossing = along.scaled_plus(share, from);
         let (begins, ends) = (up.select3(from, crossing), next_up.select3(to, crossing));
-        sum = sum + (up | next_up).keep(edge(begins, ends, normal));
+        let one = zero.number(1.0);
+        let part = next_up.select(one, share) - up.select(zero, share);
+        let cross = cross(from, along) * part;
+        sum = sum + (up | next_up).keep(edge(cross, begins.dot(ends), normal));
         dips = (up & !next_up).select3(crossing, dips);
         rises = (!up & next_up).select3(crossing, rises);
         (from, from_z) = (to, to_z);
     }
-    sum = sum + edge(dips, rises, normal);
+    sum = sum + edge(cross(dips, rises), dips.dot(rises), normal);
     (sum * zero.number(0.5)).abs()
 }
 
-/// The angle between two directions times the cosine between the normal and that of their plane; 0 for none.
 #[inline(always)]
-fn edge<S: Simd>(a: Vec3<S>, b: Vec3<S>, normal: Vec3<S>) -> Lanes<S> {
-    let cross = Vec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+fn cross<S: Simd>(a: Vec3<S>, b: Vec3<S>) -> Vec3<S> {
+    Vec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+}
+
+/// The angle between two directions of this cross and dot product times the cosine between the normal and that of their plane; 0 for none.
+#[inline(always)]
+fn edge<S: Simd>(cross: Vec3<S>, dot: Lanes<S>, normal: Vec3<S>) -> Lanes<S> {
     let length = cross.length_squared().sqrt();
     let some = length.above(length.number(0.0));
-    some.keep(length.angle_of(a.dot(b)) * cross.dot(normal) / some.select(length, length.number(1.0)))
+    some.keep(length.angle_of(dot) * cross.dot(normal) / some.select(length, length.number(1.0)))
 }
 
 /// Steps of [`Surround`]'s table.
@@ -167,6 +182,17 @@ mod tests {
         let light = QuadLight::new(Quad::new(DVec3::Z, 0.5 * DVec3::Y, 0.5 * DVec3::X), DVec3::ONE);
         let want = 4.0 * (0.5 / 1.25f64.sqrt()) * (0.5 / 1.25f64.sqrt()).atan();
         assert!((vectorised(Irradiance(&light, DVec3::ZERO, DVec3::Z)) - want).abs() < 1e-14);
+    }
+
+    /// Small lights far away: A·cosθ·cosθ'/r², where the sum over edges cancels most of its digits.
+    #[test]
+    fn small_lights_keep_their_digits() {
+        for distance in [1e2, 1e4, 1e6, 1e8] {
+            let light = QuadLight::new(Quad::new(distance * DVec3::Z, 0.5 * DVec3::Y, 0.5 * DVec3::X), DVec3::ONE);
+            let normal = DVec3::new(0.6, 0.0, 0.8);
+            let got = vectorised(Irradiance(&light, DVec3::ZERO, normal)) * distance * distance;
+            assert!((got - 0.8).abs() < 1.0 / (distance * distance) + 1e-7, "{distance:e}: {got}");
+        }
     }
 
     struct Albedo<'a>(&'a Surround, f64);

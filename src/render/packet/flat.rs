@@ -139,7 +139,7 @@ impl<'a> FlatScene<'a> {
 
     /// Whether what the environment sends has a closed form: it is even, and there is nothing but one body.
     pub fn closed_environment(&self) -> bool {
-        self.environment.is_some() && self.spheres.len() + self.pieces.len() == 1
+        self.environment.is_some() && self.surfaces == 1 && self.spheres.len() + self.pieces.len() == 1
     }
 
     /// Whether rays must look for light that no closed form gives.

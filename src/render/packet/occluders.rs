@@ -58,12 +58,15 @@ fn may_hide(piece: &Piece, surfaces: &[Extent], light: &Light) -> bool {
     let slack = ROUNDING * piece.reach;
     let surfaces = surfaces.iter().map(|s| s.distances(point, normal));
     let (low, high) = surfaces.fold((0.0f64, 0.0f64), |(l, h), (low, high)| (l.min(low), h.max(high)));
+    // Lengths for places, a sine for a direction.
+    let mut light_slack = slack;
     let (light_low, light_high) = match light {
         Light::Point { position, .. } => {
             let d = (*position - point).dot(normal);
             (d, d)
         }
         Light::Directional { toward, .. } => {
+            light_slack = ROUNDING;
             let d = toward.dot(normal);
             (d, d)
         }
@@ -76,8 +79,8 @@ fn may_hide(piece: &Piece, surfaces: &[Extent], light: &Light) -> bool {
         }
         Light::Spot(_) | Light::Sphere(_) | Light::Mesh(_) => return true,
     };
-    let above = low >= -slack && light_low >= -slack;
-    let below = high <= slack && light_high <= slack;
+    let above = low >= -slack && light_low >= -light_slack;
+    let below = high <= slack && light_high <= light_slack;
     !(above || below)
 }
 
