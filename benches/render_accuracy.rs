@@ -6,7 +6,6 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use goniofit::control::Control;
-use goniofit::image::Image;
 use goniofit::render::scene::builtin;
 use goniofit::render::{Film, Materials, Options, Plan, Scene, render};
 
@@ -20,15 +19,6 @@ fn picture(scene: &Scene, options: Options) -> Film {
     render(scene, &Options { width: SIDE, height: SIDE, ..options }, Control::silent()).expect("options are in range")
 }
 
-/// The root of the mean of (x − truth)²/(truth² + (L̄/10)²).
-fn off_by(image: &Image, truth: &Image) -> f64 {
-    let values = || truth.radiance.iter().flatten();
-    let n = values().count() as f64;
-    let floor = (0.1 * values().sum::<f64>() / n).powi(2);
-    let pairs = image.radiance.iter().flatten().zip(values());
-    (pairs.map(|(x, t)| (x - t).powi(2) / (t * t + floor)).sum::<f64>() / n).sqrt()
-}
-
 fn targets(trials: u64) {
     println!(
         "| scene | target | met in trials of {trials} | error, mean | stated, mean | samples a pixel |\n|---|---|---|---|---|---|"
@@ -37,13 +27,13 @@ fn targets(trials: u64) {
         [("sphere", 0.005), ("sphere-on-plane", 0.02), ("cornell", 0.05), ("cornell", 0.02), ("preview", 0.03)]
     {
         let scene = built(name);
-        let truth = picture(&scene, Options { samples: 1 << 15, seed: 1, ..Options::default() }).to_image();
+        let truth = picture(&scene, Options { samples: 1 << 15, seed: 1, ..Options::default() });
         let (mut met, mut error, mut stated, mut samples) = (0, 0.0, 0.0, 0.0);
         for trial in 0..trials {
             let options =
                 Options { samples: 1 << 20, seed: 100 + trial, target_error: Some(target), ..Options::default() };
             let film = picture(&scene, options);
-            let off = off_by(&film.to_image(), &truth);
+            let off = film.off_by(&truth);
             met += u64::from(off <= target);
             error += off;
             stated += film.error().expect("samples enough").relative;

@@ -69,18 +69,12 @@ pub fn scene_effects(
             && let Some(film) = without(effect.name, stage, &materials, &scene, &|s, plan| of(s, plan, options.seed))?
         {
             found.share = Some(1.0 - film.seconds / all.seconds);
-            found.off_by = Some(difference(&film, &all));
+            found.off_by = Some(film.off_by(&all));
         }
         effects.push(found);
     }
     let (seconds, seconds_full) = (all.seconds, full.seconds);
-    Ok(SceneEffects {
-        effects,
-        seconds,
-        seconds_full,
-        full_off_by: difference(&full, &all),
-        noise: difference(&other, &all),
-    })
+    Ok(SceneEffects { effects, seconds, seconds_full, full_off_by: full.off_by(&all), noise: other.off_by(&all) })
 }
 
 /// The picture without an effect; `None` for one that only says how the picture is computed.
@@ -139,15 +133,4 @@ fn without_gloss(spec: &mut SceneSpec, materials: &Materials) -> Option<Material
         Material::Black => Some(Material::Black),
     };
     materials.iter().map(|(name, material)| Some((name.clone(), matte(material)?))).collect()
-}
-
-/// How far one picture is off another.
-fn difference(a: &Film, b: &Film) -> f64 {
-    let pixels = || (0..b.height).flat_map(|y| (0..b.width).map(move |x| (x, y)));
-    let pairs = || pixels().filter_map(|(x, y)| Some((a.radiance(x, y)?, b.radiance(x, y)?)));
-    let n = 3.0 * f64::from(b.width) * f64::from(b.height);
-    let mean = pairs().map(|(_, q)| q.element_sum()).sum::<f64>() / n;
-    let floor = (0.1 * mean).powi(2).max(f64::MIN_POSITIVE);
-    let squares = pairs().map(|(p, q)| ((p - q).powf(2.0) / (q * q + floor)).element_sum()).sum::<f64>();
-    (squares / n).sqrt()
 }

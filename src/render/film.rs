@@ -9,7 +9,7 @@ use super::RenderError;
 use super::camera::Camera;
 use super::integrator::{PathResult, Strategy, Tracer, Watch};
 use super::layers::{Gathered, LayerSet, Sight, layer};
-use super::noise::{Noise, PictureError, standard_errors};
+use super::noise::{Noise, PictureError, relative_squares, standard_errors};
 use super::packet::{FlatScene, Found, Packets};
 use super::pixel::Pixel;
 use super::plan::Plan;
@@ -163,6 +163,17 @@ impl Film {
     #[must_use]
     pub fn error(&self) -> Option<PictureError> {
         (self.samples() >= 2).then(|| Noise::all(&self.noise()).error())
+    }
+
+    /// How far the picture is off another of its size, which stands for the truth, measured as [`PictureError`] is; pixels that one of them lacks
+    /// don't count.
+    #[must_use]
+    pub fn off_by(&self, truth: &Self) -> f64 {
+        let mean = truth.mean();
+        let pixels = (0..truth.height).flat_map(|y| (0..truth.width).map(move |x| (x, y)));
+        let pairs = pixels.filter_map(|(x, y)| Some((self.radiance(x, y)?, truth.radiance(x, y)?)));
+        let sum: f64 = pairs.map(|(p, q)| relative_squares((p - q) * (p - q), q, mean)).sum();
+        (sum / (3.0 * f64::from(truth.width) * f64::from(truth.height))).sqrt()
     }
 
     /// The picture with its layers. `mask` is the mean over the pixel's paths of the largest weight at which each asked for a value

@@ -11,7 +11,7 @@ use super::tiles::Tile;
 use crate::numeric::stats::chi_square_quantile;
 
 /// A relative error counts against the radiance where it is above this share of the picture's mean, else against that.
-pub(super) const DARK: f64 = 0.1;
+const DARK: f64 = 0.1;
 
 /// What the scatter of samples must be multiplied with: by the power of 4 by which it lies under the tile's largest, the sums of both.
 #[derive(Debug, Default)]
@@ -72,6 +72,12 @@ pub(super) fn standard_errors(tile: Tile, pixels: &[Pixel]) -> Vec<DVec3> {
     pixels.iter().map(error).collect()
 }
 
+/// Squared errors of a pixel's channels against its radiance, summed; `mean` is the picture's.
+pub(super) fn relative_squares(squares: DVec3, radiance: DVec3, mean: f64) -> f64 {
+    let floor = (DARK * mean).powi(2).max(f64::MIN_POSITIVE);
+    (squares / (radiance * radiance + floor)).element_sum()
+}
+
 /// Sums over pixels: of the squared relative errors, and of what says how sure that is.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Noise {
@@ -85,13 +91,10 @@ pub(super) struct Noise {
 impl Noise {
     /// That of a tile, of a picture whose mean radiance is `mean`.
     pub fn of(tile: Tile, pixels: &[Pixel], mean: f64) -> Self {
-        let floor = (DARK * mean).powi(2).max(f64::MIN_POSITIVE);
         let mut noise = Self::default();
         for slot in tile.slots() {
             let pixel = &pixels[slot];
-            let level = pixel.mean();
-            let relative = pixel.disagreement() / (level * level + floor);
-            let value = relative.element_sum();
+            let value = relative_squares(pixel.disagreement(), pixel.mean(), mean);
             noise.sum += value;
             noise.squares += value * value;
             noise.pixels += 1;
