@@ -54,14 +54,29 @@ pub trait Lobe: Send + Sync + std::fmt::Debug {
     }
 }
 
+/// Where a pair of directions stands for a [`Sight`]: what does not depend on a shape.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Place {
+    /// Angle from the mirror direction to wo, rad.
+    pub alpha: f64,
+    /// cosθi/cosθo.
+    pub ratio: f64,
+    /// How far what is averaged over reaches besides cones, rad.
+    pub smear: f64,
+    /// Direction to the source.
+    pub wi: DVec3,
+    /// Direction to the detector.
+    pub wo: DVec3,
+}
+
 /// Lobes as an instrument sees them: averaged over the directions that its source lights and its detector takes in.
 pub trait Sight: Send + Sync + std::fmt::Debug {
     /// What it averages over, in a few words.
     fn describe(&self) -> String;
 
-    /// Where a pair of directions stands: two numbers that do not depend on a shape. `None` where what is averaged over reaches below the horizon,
+    /// Where a pair of directions stands. `None` where what is averaged over reaches below the horizon,
     /// so that lobes have no value to compare a reading with.
-    fn place(&self, wi: DVec3, wo: DVec3) -> Option<[f64; 2]>;
+    fn place(&self, wi: DVec3, wo: DVec3) -> Option<Place>;
 
     /// Makes what [`Self::fill`] of this shape needs, as long as `until` is not past; whether all is there.
     fn prepare(&self, _kind: LobeKind, _shape: &[f64], _until: Instant) -> bool {
@@ -74,14 +89,7 @@ pub trait Sight: Send + Sync + std::fmt::Debug {
     }
 
     /// As [`Lobe::fill`], at such places.
-    fn fill(
-        &self,
-        kind: LobeKind,
-        shape: &[f64],
-        places: &[[f64; 2]],
-        values: &mut [f64],
-        derivatives: &mut [Vec<f64>],
-    );
+    fn fill(&self, kind: LobeKind, shape: &[f64], places: &[Place], values: &mut [f64], derivatives: &mut [Vec<f64>]);
 }
 
 /// Most shape parameters that a lobe may have.

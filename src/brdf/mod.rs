@@ -17,7 +17,7 @@ pub use file::{
     BootstrapRecord, Correlation, EnergyRecord, FitRecord, LobeRecord, MaterialError, ModelCandidate, ModelChoice,
     ResidualRecord, SearchRecord, SubsetRecord,
 };
-pub use lobe::{Lobe, LobeKind, Parameter, Sight};
+pub use lobe::{Lobe, LobeKind, Parameter, Place, Sight};
 pub use material::{LobeTerm, Material, PerChannel, Reflectance};
 pub(crate) use spec::MAX_LOBES;
 pub use spec::{ModelSpec, SpecError};

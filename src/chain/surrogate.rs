@@ -35,14 +35,14 @@ impl Surrogate {
         lean::found(readings, instrument, upright, fitted, |model| may_stand_off(&model.material, instrument))
     }
 
-    /// A plain fit, unless source and aperture smear a lobe that stands out.
+    /// A plain fit, unless source, aperture and spot smear a lobe that stands out.
     fn fitted(readings: &Measurement, instrument: &Instrument) -> Option<Self> {
         let options = FitOptions::new(MODEL.parse().ok()?);
         let plain = within_reason(readings, &options)?;
         let cones = || Cones::of(instrument).filter(|_| readings.dimension == Dimension::Space);
         if let Some(cones) = cones().filter(|_| is_smeared(&plain, instrument)) {
-            let cones = std::sync::Arc::new(cones);
-            let seen = FitOptions { through: Some(cones.clone()), ..options };
+            let cones = std::sync::Arc::new(cones.rough());
+            let seen = FitOptions { through: Some(cones.clone()), profiles: false, ..options };
             let fitted = within_reason(readings, &seen);
             drop(seen);
             if let Some(material) = fitted {
@@ -72,9 +72,12 @@ fn within_reason(readings: &Measurement, options: &FitOptions) -> Option<Materia
     Some(held.unwrap_or(free))
 }
 
-/// Sum of the squares of both cones' half angles.
+/// Sum of the squares of both cones' half angles and of what the spot smears.
 fn spread(instrument: &Instrument) -> f64 {
-    instrument.source.half_angle().powi(2) + instrument.detector.half_angle().powi(2)
+    let near = |distance: f64| if distance > 0.0 { 1.0 / distance } else { 0.0 };
+    let nearness = near(instrument.source.distance_m) + near(instrument.detector.distance_m);
+    let spot = 0.5 * instrument.source.beam_diameter_m * nearness;
+    instrument.source.half_angle().powi(2) + instrument.detector.half_angle().powi(2) + spot.powi(2)
 }
 
 /// Whether the cones change a lobe whose peak stands out of the diffuse part. Of a lobe of exponent n a disc of half angle a takes n a²/4 of the peak.

@@ -70,6 +70,8 @@ pub struct FitOptions {
     pub target_rmse_excess: Option<f64>,
     /// Standard errors by redrawing the data, beside the analytic ones.
     pub bootstrap: Option<Bootstrap>,
+    /// Intervals by profile where a standard error's does not do; else all are estimate ± t·σ, and no other valley is looked for along profiles.
+    pub profiles: bool,
     /// Most steps of the solver from one start.
     pub max_iterations: u64,
 }
@@ -93,6 +95,7 @@ impl FitOptions {
             time_budget: None,
             target_rmse_excess: None,
             bootstrap: None,
+            profiles: true,
             max_iterations: 100,
         }
     }

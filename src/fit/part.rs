@@ -148,7 +148,9 @@ fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Part, FitError
     let mut uncertainty = covariance::uncertainty(search.problem, &solution, Some(&moments), None);
     identify::by_search(search, &solution, &mut uncertainty);
     solution.cost = uncertainty.cost;
-    let intervals = intervals::by_search(search, &solution, &uncertainty);
+    let by_profile = || intervals::by_search(search, &solution, &uncertainty);
+    let intervals =
+        if options.profiles { by_profile() } else { intervals::plain(search.problem, &solution, &uncertainty) };
     finish(search.problem, solution, uncertainty, intervals, found)
 }
 
@@ -246,7 +248,11 @@ fn judge(
     part.saturation = problem.saturation;
     identify::by_passes(&part, &solution, &mut uncertainty);
     let solution = Solution { cost: uncertainty.cost, ..solution };
-    let (intervals, lower) = intervals::by_passes(problem, &solution, &uncertainty, true);
+    let (intervals, lower) = if options.profiles {
+        intervals::by_passes(problem, &solution, &uncertainty, true)
+    } else {
+        (intervals::plain(problem, &solution, &uncertainty), None)
+    };
     Ok(Judged { solution, outcome, uncertainty, intervals, lower })
 }
 

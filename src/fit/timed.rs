@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::options::{FitError, FitOptions};
-use crate::brdf::{LobeKind, Sight};
+use crate::brdf::{LobeKind, Place, Sight};
 
 /// What lasts less is no making of anything.
 const INSTANT: Duration = Duration::from_micros(50);
@@ -45,7 +45,7 @@ impl Sight for Timed {
         self.sight.describe()
     }
 
-    fn place(&self, wi: DVec3, wo: DVec3) -> Option<[f64; 2]> {
+    fn place(&self, wi: DVec3, wo: DVec3) -> Option<Place> {
         self.sight.place(wi, wo)
     }
 
@@ -53,14 +53,7 @@ impl Sight for Timed {
         self.ended.load(Ordering::Relaxed).then(|| self.made.load(Ordering::Relaxed))
     }
 
-    fn fill(
-        &self,
-        kind: LobeKind,
-        shape: &[f64],
-        places: &[[f64; 2]],
-        values: &mut [f64],
-        derivatives: &mut [Vec<f64>],
-    ) {
+    fn fill(&self, kind: LobeKind, shape: &[f64], places: &[Place], values: &mut [f64], derivatives: &mut [Vec<f64>]) {
         if self.prepared(kind, shape) {
             return self.sight.fill(kind, shape, places, values, derivatives);
         }
@@ -110,7 +103,7 @@ mod tests {
             String::new()
         }
 
-        fn place(&self, _wi: DVec3, _wo: DVec3) -> Option<[f64; 2]> {
+        fn place(&self, _wi: DVec3, _wo: DVec3) -> Option<Place> {
             None
         }
 
@@ -122,7 +115,7 @@ mod tests {
             is_early
         }
 
-        fn fill(&self, _: LobeKind, _: &[f64], _: &[[f64; 2]], values: &mut [f64], _: &mut [Vec<f64>]) {
+        fn fill(&self, _: LobeKind, _: &[f64], _: &[Place], values: &mut [f64], _: &mut [Vec<f64>]) {
             values.fill(1.0);
         }
     }

@@ -140,7 +140,7 @@ impl<'a> Study<'a> {
         if effects::turns_light(name) {
             found.uncertain = self.quadrature_error + error;
         }
-        if effects::is_cone(name) {
+        if effects::is_mean(name) {
             found.seconds = (self.seconds_of(LIGHT) - light_seconds).max(0.0);
         }
         if let (Some(base), Some(less)) = (base, self.reduced(less, Some(name))) {

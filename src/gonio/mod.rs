@@ -27,6 +27,7 @@ pub mod sight;
 mod simulate;
 mod spare;
 mod spec;
+mod spot;
 mod travel;
 
 pub use actual::Actual;

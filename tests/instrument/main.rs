@@ -18,5 +18,6 @@ mod planned;
 mod presets;
 mod raw;
 mod rows;
+mod spot;
 mod support;
 mod through;

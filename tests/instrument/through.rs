@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::support::*;
 use glam::DVec3;
-use goniofit::brdf::{LobeKind, Material, Sight};
+use goniofit::brdf::{LobeKind, Material, Place, Sight};
 use goniofit::fit::{FitOptions, fit};
 use goniofit::geometry::direction;
 use goniofit::gonio::Instrument;
@@ -73,7 +73,7 @@ fn a_lobe_seen_through_the_instrument_is_what_it_reads() {
         let raw = read_nominal(&material, &instrument, &scan);
         let read = reduced(&raw, &instrument, &material).measurement;
         let pairs: Vec<(DVec3, DVec3)> = (0..scan.0.len()).map(|i| scan.0.pair(i)).collect();
-        let places: Vec<[f64; 2]> = pairs.iter().map(|(wi, wo)| cones.place(*wi, *wo).expect("above")).collect();
+        let places: Vec<Place> = pairs.iter().map(|(wi, wo)| cones.place(*wi, *wo).expect("above")).collect();
         let (mut values, mut slopes) = (vec![0.0; places.len()], vec![vec![0.0; places.len()]]);
         cones.fill(LobeKind::Phong, &[n], &places, &mut values, &mut slopes);
         let largest = values.iter().copied().fold(0.0, f64::max);

@@ -50,8 +50,9 @@ impl Args {
         match Cones::of(&instrument) {
             Some(cones) => Ok(Some(Arc::new(cones))),
             None => Err(Failure::usage(format!(
-                "--through {name}: expected an instrument with an aperture (instrument.detector.aperture_deg) or a divergence \
-                 (instrument.source.divergence_deg), found points, through which a fit is the plain one"
+                "--through {name}: expected an instrument with an aperture (instrument.detector.aperture_deg), a divergence \
+                 (instrument.source.divergence_deg) or a spot near them (instrument.source.beam_diameter_m, instrument.detector.distance_m), found \
+                 points, through which a fit is the plain one"
             ))),
         }
     }

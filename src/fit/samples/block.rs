@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::brdf::Place;
 use crate::measurement::MerlGrid;
 use crate::numeric::simd::{Kernel, Simd};
 
@@ -16,7 +17,7 @@ pub(in crate::fit) struct Block {
     /// Coordinate of the lobes that have a shape.
     pub x: Vec<f64>,
     /// Where each sample stands for an instrument that lobes are seen through; left out without one.
-    pub places: Vec<[f64; 2]>,
+    pub places: Vec<Place>,
     /// 1 where a sample is a neighbour of the one before, else 0.
     pub pairs: Vec<f64>,
     /// Normalised weight w, one list for all channels or one a channel; 0 where masked.

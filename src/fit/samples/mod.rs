@@ -241,7 +241,7 @@ impl Samples<'_> {
     /// Whether a lobe of one shape parameter is 0 on all samples.
     pub fn are_dark(&self, kind: LobeKind, shape: &[f64]) -> bool {
         let nearest = match (&self.source, &self.sight) {
-            (Source::Listed(all), Some(_)) => all.places.iter().min_by(|a, b| a[0].total_cmp(&b[0])),
+            (Source::Listed(all), Some(_)) => all.places.iter().min_by(|a, b| a.alpha.total_cmp(&b.alpha)),
             _ => None,
         };
         let mut value = [0.0];

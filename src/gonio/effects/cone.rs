@@ -121,10 +121,15 @@ impl Cones {
         f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
         out: &mut [f64],
     ) -> f64 {
+        if self.half == [0.0; 2] {
+            out.fill(0.0);
+            f(wi, wo, 1.0, out);
+            return 0.0;
+        }
         let about = (frame_about(wi, self.dimension), frame_about(wo, self.dimension));
         let mut before = vec![0.0; out.len()];
         let last = self.rules.len() - 1;
-        let needed = self.peak(wi, wo, f, out).map_or(0, |width| self.level_for(width));
+        let needed = self.peak(wi, wo, self.reach(), f, out).map_or(0, |width| self.level_for(width));
         // Two levels at least: their difference is what is known of the error.
         let (first, end) = (needed.min(last.saturating_sub(1)), (needed + 2).max(self.usual - 1).min(last));
         let mut change = f64::INFINITY;
@@ -160,16 +165,22 @@ impl Cones {
         }
     }
 
-    /// Half width (rad), within a factor of two, of a peak about the mirror direction that the cones reach and low orders might miss between
+    /// How far from the middle both cones see together, rad.
+    pub fn reach(&self) -> f64 {
+        self.half[0] + self.half[1]
+    }
+
+    /// Half width (rad), within a factor of two, of a peak about the mirror direction that is within `reach` and that low orders might miss between
     /// their directions. Nothing is known of other peaks.
-    fn peak(
+    pub fn peak(
         &self,
         wi: DVec3,
         wo: DVec3,
+        reach: f64,
         f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
         scratch: &mut [f64],
     ) -> Option<f64> {
-        let (top, reach) = (mirror(wi), self.half[0] + self.half[1]);
+        let top = mirror(wi);
         if angle_between(top, wo) > NEAR * reach {
             return None;
         }
@@ -198,7 +209,7 @@ impl Cones {
 }
 
 /// Relative change between two values.
-fn moved(new: f64, old: f64) -> f64 {
+pub(super) fn moved(new: f64, old: f64) -> f64 {
     if new == old { 0.0 } else { (new - old).abs() / new.abs().max(old.abs()) }
 }
 

@@ -2,15 +2,15 @@
 //!
 //! In the sample's plane the beam is an ellipse of semi-axes b/cosθi (towards wi) and b, the sample a disc, the field of view an ellipse like the beam's
 //! with θo. The share is cosθi/(πb²) times the area that all three have in common: 1 while the beam is inside the others, ∝ cosθi where it
-//! overfills the sample, ∝ cosθi/cosθo where it overfills the field. All are centred, so the common part is ½∫ min r² dφ, and 1/r² of each
-//! is c₀ + c₁ cos2φ + s₁ sin2φ: two cross where that is one equation in 2φ, and between crossings the integral is an ellipse's sector, closed.
+//! overfills the sample, ∝ cosθi/cosθo where it overfills the field. All are centred, so the common part is closed ([`crate::gonio::spot::outline`]).
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::PI;
 
 use glam::DVec3;
 
 use super::{Block, Entry, Maker, Pass};
 use crate::gonio::instrument::Instrument;
+use crate::gonio::spot::outline::{Outline, Piece, common};
 use crate::measurement::Dimension;
 
 pub(super) const EFFECT: Entry = Entry {
@@ -48,13 +48,32 @@ pub(in crate::gonio) struct Footprint {
 impl Footprint {
     /// The instrument's; `None` where nothing cuts its beam.
     pub fn of(instrument: &Instrument, dimension: Dimension) -> Option<Self> {
+        (!cut_by(instrument).is_empty()).then(|| Self::of_beam(instrument, dimension))
+    }
+
+    /// The same, cut or not; the beam has a size.
+    pub fn of_beam(instrument: &Instrument, dimension: Dimension) -> Self {
         let radius = |diameter: f64| if diameter > 0.0 { 0.5 * diameter } else { f64::INFINITY };
-        (!cut_by(instrument).is_empty()).then(|| Self {
+        Self {
             beam: 0.5 * instrument.source.beam_diameter_m,
             sample: radius(instrument.sample.diameter_m),
             field: radius(instrument.detector.field_diameter_m),
             dimension,
-        })
+        }
+    }
+
+    /// The edge of what counts, over half a turn; in the flat world [`Self::length`] is what it is there.
+    pub fn edge(&self, wi: DVec3, wo: DVec3) -> Vec<Piece> {
+        common(&self.outlines(wi, wo))
+    }
+
+    /// In the flat world half of the length that counts.
+    pub fn length(&self, wi: DVec3, wo: DVec3) -> f64 {
+        (self.beam / wi.z).min(self.sample).min(self.field / wo.z)
+    }
+
+    fn outlines(&self, wi: DVec3, wo: DVec3) -> [Outline; 3] {
+        [Outline::across(wi, self.beam), Outline::disc(self.sample), Outline::across(wo, self.field)]
     }
 
     /// The share of the beam that counts; 0 below the horizon.
@@ -64,91 +83,14 @@ impl Footprint {
         }
         if self.dimension == Dimension::Flat {
             // Three centred lengths of a line.
-            let length = (self.beam / wi.z).min(self.sample).min(self.field / wo.z);
-            return (wi.z * length / self.beam).min(1.0);
+            return (wi.z * self.length(wi, wo) / self.beam).min(1.0);
         }
-        let outlines = [Outline::across(wi, self.beam), Outline::disc(self.sample), Outline::across(wo, self.field)];
+        let outlines = self.outlines(wi, wo);
         if outlines[1..].iter().all(|edge| outlines[0].lies_within(edge)) {
             return 1.0; // exactly, as without edges
         }
-        let mut ends: Vec<f64> = vec![0.0, PI];
-        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
-            ends.extend(outlines[a].crossings(&outlines[b]));
-        }
-        ends.sort_by(f64::total_cmp);
-        // Each outline is its own image about the centre: half a turn holds half of the area.
-        let area = 2.0 * ends.windows(2).map(|e| sector(&outlines, e[0], e[1])).sum::<f64>();
+        let area = 2.0 * common(&outlines).iter().map(Piece::area).sum::<f64>();
         (wi.z * area / (PI * self.beam * self.beam)).min(1.0)
-    }
-}
-
-/// The area of what all outlines have in common, between two azimuths that no crossing lies between.
-fn sector(outlines: &[Outline; 3], from: f64, to: f64) -> f64 {
-    let middle = 0.5 * (from + to);
-    let nearest = outlines.iter().max_by(|a, b| a.inverse_square(middle).total_cmp(&b.inverse_square(middle)));
-    nearest.map_or(0.0, |outline| outline.sector(from, to))
-}
-
-/// A centred ellipse, 1/r² = u cos²(φ − φ₀) + v sin²(φ − φ₀).
-#[derive(Debug, Clone, Copy)]
-struct Outline {
-    u: f64,
-    v: f64,
-    phi: f64,
-}
-
-impl Outline {
-    fn disc(radius: f64) -> Self {
-        let v = radius.powi(-2);
-        Self { u: v, v, phi: 0.0 }
-    }
-
-    /// What a beam of this radius along `w` covers of the plane.
-    fn across(w: DVec3, radius: f64) -> Self {
-        let v = radius.powi(-2);
-        Self { u: v * w.z * w.z, v, phi: w.y.atan2(w.x) }
-    }
-
-    /// c₀, c₁ and s₁ of 1/r².
-    fn harmonics(&self) -> [f64; 3] {
-        let (mean, half) = (0.5 * (self.u + self.v), 0.5 * (self.u - self.v));
-        let (sin, cos) = (2.0 * self.phi).sin_cos();
-        [mean, half * cos, half * sin]
-    }
-
-    fn inverse_square(&self, phi: f64) -> f64 {
-        let (sin, cos) = (phi - self.phi).sin_cos();
-        self.u * cos * cos + self.v * sin * sin
-    }
-
-    /// Azimuths in (0, π) where both have the same radius.
-    fn crossings(&self, other: &Self) -> Vec<f64> {
-        let (a, b) = (self.harmonics(), other.harmonics());
-        let [mean, cos, sin] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-        let size = cos.hypot(sin);
-        if size == 0.0 || mean.abs() >= size {
-            return Vec::new();
-        }
-        let (towards, away) = (sin.atan2(cos), (-mean / size).acos());
-        [towards + away, towards - away].map(|twice| 0.5 * twice.rem_euclid(TAU)).to_vec()
-    }
-
-    /// Whether nothing of it is outside of the other.
-    fn lies_within(&self, other: &Self) -> bool {
-        self.inverse_square(0.0) >= other.inverse_square(0.0) && self.crossings(other).is_empty()
-    }
-
-    /// ½∫ r² dφ: 1/(2√(uv)) times what the ellipse's own angle, tan⁻¹(√(v/u) tan(φ − φ₀)), advances by.
-    fn sector(&self, from: f64, to: f64) -> f64 {
-        let angle = |phi: f64| {
-            let t = phi - self.phi;
-            let quarters = (t / FRAC_PI_2).round();
-            let (sin, cos) = t.sin_cos();
-            let own = (self.v.sqrt() * sin).atan2(self.u.sqrt() * cos);
-            // The own angle is within a quarter of a turn of t: the branch of the arctangent follows.
-            own + TAU * ((quarters * FRAC_PI_2 - own) / TAU).round()
-        };
-        0.5 * (angle(to) - angle(from)) / (self.u * self.v).sqrt()
     }
 }
 

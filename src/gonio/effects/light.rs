@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::cone::Cones;
+use super::cone::{Cones, moved};
 use super::{Block, Maker, Pass};
 use crate::brdf::{LobeTerm, Material};
 use crate::control::Stop;
@@ -16,26 +16,30 @@ use crate::gonio::parts::Reference;
 use crate::gonio::reading::Kind;
 use crate::gonio::sight;
 use crate::gonio::simulate::Truth;
+use crate::gonio::spot::{FINEST, Spot};
 use crate::measurement::Dimension;
 
-/// The pass that turns directions into electrons a second: f·cosθo where source and aperture are points, else its mean.
+/// The pass that turns directions into electrons a second: f·cosθo where spot, source and aperture are points, else its mean.
 pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + 'a> {
     let unless_out = |half_angle: f64, name: &str| if left_out.contains(&name) { 0.0 } else { half_angle };
     let instrument = maker.instrument;
     let source = unless_out(instrument.source.half_angle(), super::divergence::EFFECT.name);
     let detector = unless_out(instrument.detector.half_angle(), super::aperture::EFFECT.name);
+    let spot = Spot::of(instrument, maker.dimension).filter(|_| !left_out.contains(&super::spot::EFFECT.name));
     let light = Light {
         gain: instrument.gain(),
         truth: maker.truth,
         standard: Standard::new(&instrument.reference, maker.actual.certificate, maker.dimension),
     };
-    if source == 0.0 && detector == 0.0 {
+    if source == 0.0 && detector == 0.0 && spot.is_none() {
         return Box::new(light);
     }
     let cones = |accuracy: f64| Cones::new(source, detector, accuracy, maker.dimension);
     let late = maker.deadline.map(|deadline| (deadline, cones(COARSEST)));
-    let lobes = Lobes::of(maker, (source, detector));
-    Box::new(Spread { light, cones: cones(maker.accuracy), late, lobes, stop: maker.stop })
+    // Half of the error is the spot's, half that of what its points see.
+    let accuracy = if spot.is_some() { 0.5 * maker.accuracy } else { maker.accuracy };
+    let lobes = Lobes::of(maker, (source, detector), accuracy);
+    Box::new(Spread { light, cones: cones(accuracy), spot, accuracy, late, lobes, stop: maker.stop })
 }
 
 /// A truth that is a sum of lobes, of which means over both cones are known without a sum over directions.
@@ -47,30 +51,29 @@ struct Lobes<'a> {
 
 impl<'a> Lobes<'a> {
     /// `None` where sums are as quick, and in the flat world.
-    fn of(maker: &Maker<'a>, (source, detector): (f64, f64)) -> Option<Self> {
+    fn of(maker: &Maker<'a>, (source, detector): (f64, f64), accuracy: f64) -> Option<Self> {
         let material = maker.lobes.filter(|_| maker.dimension == Dimension::Space)?;
-        let cones = sight::Cones::new(source, detector)?;
+        let cones = sight::Cones::new(source, detector, None)?;
         let wide = |term: &LobeTerm, c: usize| {
             term.shape_of(c).is_some_and(|shape| shape.first().is_some_and(|n| cones.are_wide_for(*n)))
         };
         let worth = material.lobes.iter().any(|term| (0..material.channels.len()).any(|c| wide(term, c)));
-        worth.then_some(Self { material, cones, accuracy: maker.accuracy })
+        worth.then_some(Self { material, cones, accuracy })
     }
 
     /// Writes the mean of f·cosθo times `gain` where it is known, and returns its error; that of `sum` where it is not as good as is asked for, and the sum is
-    /// better;
-    /// there is no time for a sum where it is late.
+    /// better. There is no time for a sum where it is late, and no need of one at a point of the spot, which counts beside brighter ones.
     fn mean(
         &self,
         (wi, wo): (DVec3, DVec3),
         gain: f64,
-        is_late: bool,
+        how: &How<'_>,
         out: &mut [f64],
         mut sum: impl FnMut(&mut [f64]) -> f64,
     ) -> f64 {
         let Some(error) = self.cones.write_flux(self.material, wi, wo, out) else { return sum(out) };
         out.iter_mut().for_each(|value| *value *= gain);
-        if error <= self.accuracy || is_late {
+        if error <= self.accuracy || how.is_part || how.late.is_some() {
             return error;
         }
         let mut summed = vec![0.0; out.len()];
@@ -145,47 +148,121 @@ impl Pass for Light<'_> {
     }
 }
 
-/// Light from a source and to a detector of some size.
+/// Light from a source, on a spot and to a detector of some size.
 struct Spread<'a> {
     light: Light<'a>,
     cones: Cones,
+    spot: Option<Spot>,
+    accuracy: f64,
     /// What counts for readings that would be late.
     late: Option<(Deadline, Cones)>,
     lobes: Option<Lobes<'a>>,
     stop: &'a Stop,
 }
 
+/// How a mean over cones is to be made.
+struct How<'a> {
+    /// By these, where it would be late otherwise.
+    late: Option<&'a Cones>,
+    /// Whether it is one point's of the spot.
+    is_part: bool,
+}
+
+/// Directions that a mean over the spot may take before it is as good as it gets.
+const MANY: usize = 300_000;
+
+impl Spread<'_> {
+    /// Writes the mean over the cones as a point of the spot sees them, and returns its error. `evaluations` counts directions.
+    fn at_point(
+        &self,
+        kind: Kind,
+        (wi, wo): (DVec3, DVec3),
+        how: &How<'_>,
+        evaluations: &mut usize,
+        out: &mut [f64],
+    ) -> f64 {
+        let (gain, mut f) = (self.light.gain, vec![0.0; out.len()]);
+        let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
+            *evaluations += 1;
+            self.light.add(kind, (wi, wo), gain * weight, &mut f, out);
+        };
+        let mut sum = |out: &mut [f64]| how.late.unwrap_or(&self.cones).mean(wi, wo, &mut add, out);
+        match self.lobes.as_ref().filter(|_| kind == Kind::Sample) {
+            Some(lobes) => lobes.mean((wi, wo), gain, how, out, sum),
+            None => sum(out),
+        }
+    }
+
+    /// Writes the mean over the spot, and returns its error: orders double from where a lobe's peak can't fall between the points.
+    fn over(&self, spot: &Spot, kind: Kind, pair: (DVec3, DVec3), late: Option<&Cones>, out: &mut [f64]) -> f64 {
+        let smear = spot.smear(pair);
+        let mut f = vec![0.0; out.len()];
+        let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
+            self.light.add(kind, (wi, wo), weight, &mut f, out);
+        };
+        let peak = self.cones.peak(pair.0, pair.1, smear + self.cones.reach(), &mut add, out);
+        let needed = peak.map_or(1, |width| Spot::order_for(smear, width));
+        let [mut before, mut of_point, mut off] = [(); 3].map(|()| vec![0.0; out.len()]);
+        let how = How { late, is_part: true };
+        let (mut evaluations, mut change) = (0, f64::INFINITY);
+        let mut order = if late.is_some() { 1 } else { needed.min(FINEST / 2) };
+        let first = order;
+        let inner = loop {
+            out.fill(0.0);
+            off.fill(0.0);
+            spot.points(pair, order, |point| {
+                let error = self.at_point(kind, (point.wi, point.wo), &how, &mut evaluations, &mut of_point);
+                for (c, value) in of_point.iter().enumerate() {
+                    out[c] += point.weight * value;
+                    off[c] += point.weight * value.abs() * error;
+                }
+            });
+            let inner = off.iter().zip(&*out).map(|(off, value)| share(*off, *value)).fold(0.0, f64::max);
+            if order > first {
+                change = out.iter().zip(&before).map(|(new, old)| moved(*new, *old)).fold(0.0, f64::max);
+            }
+            let is_good = change.is_nan() || change <= self.accuracy || late.is_some() && order > first;
+            if is_good || 2 * order > FINEST || order > first && 5 * evaluations > MANY {
+                break inner;
+            }
+            before.copy_from_slice(out);
+            order *= 2;
+        };
+        let missed = if needed > FINEST { 1.0 } else { 0.0 };
+        (change + inner).max(missed)
+    }
+}
+
 impl Pass for Spread<'_> {
     fn apply(&self, block: &mut Block<'_>) {
-        let (mut f, mut out) = (vec![0.0; block.width], vec![0.0; block.width]);
+        let mut out = vec![0.0; block.width];
         let mut last = None;
         for (i, reading) in block.readings.iter().enumerate() {
             if self.stop.requested() {
                 block.done = i;
                 return;
             }
-            let (gain, light) = (self.light.gain, &self.light);
-            let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
-                light.add(reading.kind, (wi, wo), gain * weight, &mut f, out);
-            };
             // Repeats and exposures of one stop have the same mean.
-            let here = Some((reading.kind, block.wi[i], block.wo[i]));
-            if here != last {
-                let (wi, wo) = (block.wi[i], block.wo[i]);
+            let (kind, pair) = (reading.kind, (block.wi[i], block.wo[i]));
+            if Some((kind, pair)) != last {
                 let late = self.late.as_ref().filter(|(deadline, _)| deadline.presses(block.first + i));
-                let cones = late.map_or(&self.cones, |(_, coarse)| coarse);
-                let mut sum = |out: &mut [f64]| cones.mean(wi, wo, &mut add, out);
-                let lobes = self.lobes.as_ref().filter(|_| reading.kind == Kind::Sample);
-                let error = match lobes {
-                    Some(lobes) => lobes.mean((wi, wo), gain, late.is_some(), &mut out, sum),
-                    None => sum(&mut out),
+                let late = late.map(|(_, coarse)| coarse);
+                let is_lit = matches!(kind, Kind::Sample | Kind::Reference);
+                let error = match self.spot.as_ref().filter(|_| is_lit) {
+                    Some(spot) => self.over(spot, kind, pair, late, &mut out),
+                    None => self.at_point(kind, pair, &How { late, is_part: false }, &mut 0, &mut out),
                 };
                 block.error = block.error.max(error);
-                last = here;
+                last = Some((kind, pair));
             }
             block.of(i).iter_mut().zip(&out).for_each(|(s, out)| *s *= out);
         }
     }
+}
+
+/// An error over its value; none of nothing.
+fn share(off: f64, value: f64) -> f64 {
+    if off > 0.0 { off / value.abs() } else { 0.0 }
 }
 
 /// Electrons a second to electrons.

@@ -19,6 +19,7 @@ mod read_noise;
 mod saturation;
 pub(super) mod shadow;
 mod shot;
+mod spot;
 mod stray;
 pub(super) mod tilt;
 mod zero;
@@ -106,8 +107,8 @@ struct Entry {
 }
 
 /// Effects on where light comes from and goes to.
-const GEOMETRY: [Entry; 6] =
-    [zero::EFFECT, jitter::EFFECT, tilt::EFFECT, height::EFFECT, divergence::EFFECT, aperture::EFFECT];
+const GEOMETRY: [Entry; 7] =
+    [zero::EFFECT, jitter::EFFECT, tilt::EFFECT, height::EFFECT, spot::EFFECT, divergence::EFFECT, aperture::EFFECT];
 /// Effects on the flux, electrons a second.
 const FLUX: [Entry; 6] = [band::EFFECT, footprint::EFFECT, shadow::EFFECT, stray::EFFECT, power::EFFECT, dark::EFFECT];
 /// Effects on the electrons of a reading.
@@ -142,9 +143,9 @@ pub(super) fn turns_light(name: &str) -> bool {
     GEOMETRY.iter().any(|e| e.name == name)
 }
 
-/// Whether the effect is one of the means over cones, which have no pass of their own.
-pub(super) fn is_cone(name: &str) -> bool {
-    [divergence::EFFECT.name, aperture::EFFECT.name].contains(&name)
+/// Whether the effect is one of the means over directions, which have no pass of their own.
+pub(super) fn is_mean(name: &str) -> bool {
+    [spot::EFFECT.name, divergence::EFFECT.name, aperture::EFFECT.name].contains(&name)
 }
 
 /// The instrument without an effect's cause.

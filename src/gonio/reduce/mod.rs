@@ -29,6 +29,7 @@ use super::instrument::Instrument;
 use super::raw::Raw;
 use super::reading::Kind;
 use super::simulate::Truth;
+use super::spot::Spot;
 use crate::measurement::{Dimension, Masked, Measurement};
 
 /// Why raw readings can't be reduced.
@@ -111,6 +112,7 @@ pub fn reduce(
 /// What turns a net rate into a BRDF.
 struct Scale {
     footprint: Option<Footprint>,
+    spot: Option<Spot>,
     /// The mean of cosθo over the aperture, over its value in the middle.
     mean_cos: f64,
     /// f_ref cosθref share_ref; where there is no reference, 1 over the gain.
@@ -124,9 +126,11 @@ impl Scale {
         let share = footprint.map_or(1.0, |f| f.share(wi, wo));
         let standard = Standard::new(&instrument.reference, 0.0, dimension);
         let mean_cos = mean_cos(instrument, dimension);
-        let of_standard = standard.value(wi, wo) * wo.z * mean_cos * share;
+        let spot = Spot::of(instrument, dimension);
+        let of_standard = of_reference(&standard, spot.as_ref(), (wi, wo)) * mean_cos * share;
         Self {
             footprint,
+            spot,
             mean_cos,
             reference: if instrument.has_reference() { of_standard } else { 1.0 / instrument.gain() },
         }
@@ -134,8 +138,15 @@ impl Scale {
 
     /// BRDF over (net rate / reference's net rate), or over the net rate.
     fn of(&self, wi: DVec3, wo: DVec3) -> f64 {
-        self.reference / (wo.z * self.mean_cos * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
+        let cosine = self.spot.as_ref().map_or(wo.z, |spot| spot.cosine((wi, wo)));
+        self.reference / (cosine * self.mean_cos * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
     }
+}
+
+/// The mean of the standard's f·cosθo over the spot.
+fn of_reference(standard: &Standard, spot: Option<&Spot>, (wi, wo): (DVec3, DVec3)) -> f64 {
+    let Some(spot) = spot else { return standard.value(wi, wo) * wo.z };
+    spot.mean((wi, wo), |wi, wo| standard.value(wi, wo) * wo.z)
 }
 
 /// The mean of cosθo over the aperture, over its value in the middle.

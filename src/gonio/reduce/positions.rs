@@ -24,6 +24,7 @@ use crate::gonio::effects::tilt::frame;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::simulate::Truth;
+use crate::gonio::spot::Spot;
 use crate::measurement::Dimension;
 
 /// By how much everything is off.
@@ -82,11 +83,19 @@ pub(super) struct Optics<'a> {
     instrument: &'a Instrument,
     dimension: Dimension,
     footprint: Option<Footprint>,
+    spot: Option<Spot>,
 }
 
 impl<'a> Optics<'a> {
     fn new(instrument: &'a Instrument, dimension: Dimension) -> Self {
-        Self { instrument, dimension, footprint: Footprint::of(instrument, dimension) }
+        let (footprint, spot) = (Footprint::of(instrument, dimension), Spot::of(instrument, dimension));
+        Self { instrument, dimension, footprint, spot }
+    }
+
+    /// cosθo, over the spot, times the share of the beam.
+    fn light(&self, (wi, wo): (DVec3, DVec3)) -> f64 {
+        let cosine = self.spot.as_ref().map_or(wo.z, |spot| spot.cosine((wi, wo)));
+        cosine * self.footprint.map_or(1.0, |f| f.share(wi, wo))
     }
 
     /// f·cosθo times the share of the beam, all channels, with everything off by `pose`.
@@ -100,7 +109,7 @@ impl<'a> Optics<'a> {
         let (wo, near_o) = from_spot(wo, theta_o, phi_o, self.instrument.detector.distance_m);
         let mut out = vec![0.0; width];
         if wi.z > 0.0 && wo.z > 0.0 && f(wi, wo, &mut out) {
-            let factor = wo.z * near_i * near_o * self.footprint.map_or(1.0, |f| f.share(wi, wo));
+            let factor = near_i * near_o * self.light((wi, wo));
             out.iter_mut().for_each(|out| *out *= factor);
         } else {
             out.fill(0.0);
@@ -109,8 +118,8 @@ impl<'a> Optics<'a> {
     }
 
     /// BRDF over flux.
-    pub fn scale(&self, (wi, wo): (DVec3, DVec3)) -> f64 {
-        1.0 / (wo.z * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
+    pub fn scale(&self, pair: (DVec3, DVec3)) -> f64 {
+        1.0 / self.light(pair)
     }
 
     /// u and q of every error: half the difference and the rest of the average, channel by channel, and the flux in the middle.

@@ -247,7 +247,7 @@ fn power(m: f64, fall: f64) -> Jet {
 }
 
 /// cosⁿα, 0 from a right angle on.
-fn power_of_alpha(n: f64, alpha: f64) -> Jet {
+pub(super) fn power_of_alpha(n: f64, alpha: f64) -> Jet {
     power(n, 2.0 * (0.5 * alpha).sin().powi(2))
 }
 

@@ -4,7 +4,8 @@
 //! angle a, and a Lambert lobe is read as it is. Of a Phong lobe that depends on two numbers besides the
 //! exponent: the angle α between the mirror direction r and wo, and q = cosθi/cosθo. For the mean of cosⁿ∠(r′, w′) w′ over r′ about r and w′
 //! about wo lies in the plane of both, U(α) wo + W(α) r, and its z component over cosθo is U + q W. U and W with their derivatives by n are
-//! tabulated (`seen`); then a sample costs an interpolation, whatever the cones.
+//! tabulated (`seen`); then a sample costs an interpolation, whatever the cones. Where the spot has a size and source or detector are near, each of
+//! its points sees both in directions of its own: the mean over it is a sum of such interpolations, of as many as lobe and spot call for.
 //!
 //! Limits: the lobe's own end at α = 90° is smeared by rules that do not follow it exactly, so broad lobes (n below 2) are off by up to 1e-3 of their
 //! peak within an aperture's radius of it; pairs whose cones reach below the horizon have no place.
@@ -19,12 +20,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use self::disc::Disc;
-use self::seen::Tables;
+use self::disc::{Disc, power_of_alpha};
+use self::seen::{Seen, Tables};
 use super::instrument::Instrument;
-use crate::brdf::{LobeKind, Material, Sight};
+use super::spot::{FINEST, Spot};
+use crate::brdf::{LobeKind, Material, Place, Sight};
 use crate::geometry::angles::{angle_between, theta_of};
 use crate::geometry::mirror;
+use crate::measurement::Dimension;
 
 /// Half angle of a cone times √n from which on a lobe is narrow in it.
 const NARROW: f64 = 1.5;
@@ -37,28 +40,54 @@ const ROUNDED: f64 = 1e-12;
 const PIECES: f64 = 1.0;
 const APART: f64 = 0.5;
 
-/// An instrument's source and aperture, as lobes are seen through them.
+/// How good a mean over the spot is: a share of the lobe's peak, and the order a + b s of the rule that reaches it, the lobe's width being 1/s of the
+/// spot's smear.
+#[derive(Debug, Clone, Copy)]
+struct Finesse {
+    error: f64,
+    order: (f64, f64),
+    /// The finest that is made.
+    most: usize,
+}
+
+const FINE: Finesse = Finesse { error: 1e-9, order: (2.3, 2.8), most: FINEST };
+/// As long as a lobe is no narrower than a tenth of the smear.
+const ROUGH: Finesse = Finesse { error: 1e-4, order: (0.7, 1.35), most: 14 };
+/// Widths 1/√n from its peak where a lobe is nothing.
+const NOWHERE: f64 = 9.0;
+
+/// An instrument's source, aperture and spot, as lobes are seen through them.
 #[derive(Debug)]
 pub struct Cones {
     source: Disc,
     detector: Disc,
-    tables: Arc<Tables>,
+    /// None where both are points.
+    tables: Option<Arc<Tables>>,
+    spot: Option<Spot>,
+    finesse: Finesse,
 }
 
 impl Cones {
-    /// Those of an instrument; `None` where both are points, so that lobes are seen as they are.
+    /// Those of an instrument; `None` where lobes are seen as they are.
     #[must_use]
     pub fn of(instrument: &Instrument) -> Option<Self> {
-        let source = Disc { half: instrument.source.half_angle() };
-        let detector = Disc { half: instrument.detector.half_angle() };
-        Self::new(source.half, detector.half)
+        let spot = Spot::of(instrument, Dimension::Space);
+        Self::new(instrument.source.half_angle(), instrument.detector.half_angle(), spot)
     }
 
-    /// Those of these half angles, rad; `None` for points.
-    pub(super) fn new(source: f64, detector: f64) -> Option<Self> {
+    /// Cones of these half angles, rad, and a spot, where it matters; `None` for points.
+    pub(super) fn new(source: f64, detector: f64, spot: Option<Spot>) -> Option<Self> {
         let (source, detector) = (Disc { half: source }, Disc { half: detector });
-        let any = source.half > 0.0 || detector.half > 0.0;
-        any.then(|| Self { source, detector, tables: Tables::of(source, detector) })
+        let wide = source.half > 0.0 || detector.half > 0.0;
+        let any = wide || spot.is_some();
+        let tables = || wide.then(|| Tables::of(source, detector));
+        any.then(|| Self { source, detector, tables: tables(), spot, finesse: FINE })
+    }
+
+    /// The same, with means over the spot to 1e-4 of each lobe's peak: enough to tell what errors of positions do.
+    #[must_use]
+    pub fn rough(self) -> Self {
+        Self { finesse: ROUGH, ..self }
     }
 
     /// Whether sums over directions take longer than tables of a lobe of exponent `n`: over two cones at once, or one that the lobe is narrow in.
@@ -67,33 +96,34 @@ impl Cones {
         narrow(self.source) || narrow(self.detector) || self.source.half > 0.0 && self.detector.half > 0.0
     }
 
-    /// Writes ⟨f cosθo⟩ of a material, all channels, and returns by which share of itself it may be off; `None` where that is not known: where a cone
-    /// reaches below the horizon, or over the end of a broad lobe.
+    /// Writes ⟨f cosθo⟩ of a material at one point of the spot, all channels, and returns by which share of itself it may be off; `None` where that is not
+    /// known: where a cone reaches below the horizon, or over the end of a broad lobe.
     pub(super) fn write_flux(&self, material: &Material, wi: DVec3, wo: DVec3, out: &mut [f64]) -> Option<f64> {
-        let place @ [alpha, q] = self.place(wi, wo)?;
+        let Place { alpha, ratio, .. } = self.place(wi, wo)?;
         let outer = self.source.half + self.detector.half;
         let mut off = vec![0.0; out.len()];
         out.fill(0.0);
         for term in &material.lobes {
             for (c, out) in out.iter_mut().enumerate() {
                 let Some(shape) = term.shape_of(c) else { continue };
-                let n = shape.first().copied().unwrap_or(f64::INFINITY);
+                let &[n] = &shape[..] else {
+                    *out += term.weight[c] * term.kind.lobe().value(&[], 0.0, &mut []);
+                    continue;
+                };
                 if n < ENDLESS && alpha + outer > FRAC_PI_2 {
                     return None;
                 }
                 // A table errs as much as the lobe is high within a piece of it; pieces are wider the farther off they are.
                 let nearer = (alpha - PIECES / n.sqrt()).min(outer + APART * (alpha - outer)).max(0.0);
-                let (mut values, mut slopes) = ([0.0; 3], vec![vec![0.0; 3]; shape.len()]);
-                self.fill(term.kind, &shape, &[place, [nearer, q], [0.0, q]], &mut values, &mut slopes);
-                *out += term.weight[c] * values[0];
-                if !shape.is_empty() {
-                    off[c] += term.weight[c] * (TABLED * values[1] + ROUNDED * values[2]);
-                }
+                let seen = self.seen(n);
+                let [here, near, peak] = [alpha, nearer, 0.0].map(|alpha| self.read(&seen, n, alpha, ratio).0);
+                *out += term.weight[c] * here;
+                off[c] += term.weight[c] * (TABLED * near + ROUNDED * peak);
             }
         }
         let share = |(off, value): (&f64, &f64)| if *off > 0.0 { off / value.abs() } else { 0.0 };
         let worst = off.iter().zip(&*out).map(share).fold(0.0, f64::max);
-        let cos = wo.z * (0.5 * self.detector.half).cos().powi(2);
+        let cos = wo.z * self.mean_cos();
         out.iter_mut().for_each(|value| *value *= cos);
         Some(worst)
     }
@@ -102,52 +132,150 @@ impl Cones {
     pub fn write_value(&self, material: &Material, wi: DVec3, wo: DVec3, out: &mut [f64]) {
         let Some(place) = self.place(wi, wo) else { return material.write_value(wi, wo, out) };
         out.fill(0.0);
+        let mut views = Views::new(self, place);
         for term in &material.lobes {
+            // Channels mostly share their shape.
+            let mut last = (f64::NAN, 0.0);
             for (c, out) in out.iter_mut().enumerate() {
                 let Some(shape) = term.shape_of(c) else { continue };
-                let (mut value, mut slopes) = ([0.0], vec![vec![0.0]; shape.len()]);
-                self.fill(term.kind, &shape, &[place], &mut value, &mut slopes);
-                *out += term.weight[c] * value[0];
+                let value = match shape[..] {
+                    [n] if n == last.0 => last.1,
+                    [n] => views.read(n, &self.seen(n)).0,
+                    _ => term.kind.lobe().value(&[], 0.0, &mut []),
+                };
+                last = (shape.first().copied().unwrap_or(f64::NAN), value);
+                *out += term.weight[c] * value;
             }
         }
     }
+
+    /// The mean of cosθo over the aperture, over its value in the middle: (1 + cos a)/2.
+    fn mean_cos(&self) -> f64 {
+        (0.5 * self.detector.half).cos().powi(2)
+    }
+
+    /// U and W of a lobe; none for points, which see it as it is.
+    fn seen(&self, n: f64) -> Option<Arc<Seen>> {
+        self.tables.as_ref().map(|tables| tables.at(n))
+    }
+
+    /// A lobe of weight 1 as it is read from one point of the spot at α, q = cosθi/cosθo being `q`, 1/sr, and its derivative by n.
+    fn read(&self, seen: &Option<Arc<Seen>>, n: f64, alpha: f64, q: f64) -> (f64, f64) {
+        let (value, slope) = match seen {
+            Some(seen) => {
+                let [u, w, du, dw] = seen.at(alpha);
+                (u + q * w, du + q * dw)
+            }
+            None => {
+                let [value, slope] = power_of_alpha(n, alpha);
+                (value, slope)
+            }
+        };
+        let scale = 1.0 / (TAU * self.mean_cos());
+        ((n + 2.0) * scale * value, ((n + 2.0) * slope + value) * scale)
+    }
+}
+
+/// A pair of directions as points of the spot see it, by the orders that lobes ask for.
+struct Views<'a> {
+    cones: &'a Cones,
+    place: Place,
+    by_order: Vec<(usize, Vec<View>)>,
+}
+
+/// From one point: α, cosθi/cosθo, and what it counts.
+struct View {
+    alpha: f64,
+    ratio: f64,
+    weight: f64,
+}
+
+impl<'a> Views<'a> {
+    fn new(cones: &'a Cones, place: Place) -> Self {
+        Self { cones, place, by_order: Vec::new() }
+    }
+
+    /// The mean of [`Cones::read`] over the spot, what reflects more light counting more; that of the middle where the spot has no extent.
+    fn read(&mut self, n: f64, seen: &Option<Arc<Seen>>) -> (f64, f64) {
+        let (cones, place) = (self.cones, self.place);
+        let Some(spot) = &cones.spot else { return cones.read(seen, n, place.alpha, place.ratio) };
+        let order = self.order(spot, n);
+        let at = self.by_order.iter().position(|(of, _)| *of == order).unwrap_or_else(|| {
+            self.by_order.push((order, views(spot, &place, order)));
+            self.by_order.len() - 1
+        });
+        self.by_order[at].1.iter().fold((0.0, 0.0), |sums, view| {
+            let (value, slope) = cones.read(seen, n, view.alpha, view.ratio);
+            (sums.0 + view.weight * value, sums.1 + view.weight * slope)
+        })
+    }
+
+    /// The order that a lobe asks for: that of cosines where it is nothing.
+    fn order(&self, spot: &Spot, n: f64) -> usize {
+        let Place { alpha, smear, wi, wo, .. } = self.place;
+        let smooth = spot.smooth_order((wi, wo), self.cones.finesse.error);
+        if alpha > self.cones.source.half + self.cones.detector.half + smear + NOWHERE / n.sqrt() {
+            return smooth;
+        }
+        let (least, per_width) = self.cones.finesse.order;
+        ((least + per_width * smear * n.sqrt()).ceil() as usize).min(self.cones.finesse.most).max(smooth)
+    }
+}
+
+/// The points of a rule, what they count adding up to 1.
+fn views(spot: &Spot, place: &Place, order: usize) -> Vec<View> {
+    let (mut list, mut all) = (Vec::new(), 0.0);
+    spot.points((place.wi, place.wo), order, |point| {
+        let (alpha, ratio) = (near_angle(mirror(point.wi), point.wo), point.wi.z / point.wo.z);
+        let weight = point.weight * point.wo.z;
+        all += weight;
+        list.push(View { alpha, ratio, weight });
+    });
+    list.iter_mut().for_each(|view| view.weight /= all);
+    list
+}
+
+/// Chord up to which the series of its angle is good to 1e-14.
+const SHORT: f64 = 0.1;
+
+/// The angle between two unit vectors, by the series of its chord where that is short.
+fn near_angle(a: DVec3, b: DVec3) -> f64 {
+    let squared = (a - b).length_squared();
+    if squared > SHORT * SHORT {
+        return angle_between(a, b);
+    }
+    let series = 1.0
+        + squared * (1.0 / 24.0 + squared * (3.0 / 640.0 + squared * (5.0 / 7168.0 + squared * (35.0 / 294_912.0))));
+    squared.sqrt() * series
 }
 
 impl Sight for Cones {
     fn describe(&self) -> String {
         let full = |disc: Disc| format!("{:.3}°", 2.0 * disc.half.to_degrees());
-        format!("an aperture of {}, a divergence of {}", full(self.detector), full(self.source))
+        let spot = if self.spot.is_some() { ", a spot of some size" } else { "" };
+        format!("an aperture of {}, a divergence of {}{spot}", full(self.detector), full(self.source))
     }
 
-    fn place(&self, wi: DVec3, wo: DVec3) -> Option<[f64; 2]> {
-        let above = theta_of(wi) + self.source.half < FRAC_PI_2 && theta_of(wo) + self.detector.half < FRAC_PI_2;
-        above.then(|| [angle_between(mirror(wi), wo), wi.z / wo.z])
+    fn place(&self, wi: DVec3, wo: DVec3) -> Option<Place> {
+        let smear = self.spot.as_ref().map_or(0.0, |spot| spot.smear((wi, wo)));
+        let is_above = |w: DVec3, half: f64| theta_of(w) + half + smear < FRAC_PI_2;
+        let above = is_above(wi, self.source.half) && is_above(wo, self.detector.half);
+        let alpha = angle_between(mirror(wi), wo);
+        above.then(|| Place { alpha, ratio: wi.z / wo.z, smear, wi, wo })
     }
 
     fn prepare(&self, _kind: LobeKind, shape: &[f64], until: Instant) -> bool {
-        shape.iter().all(|n| self.tables.prepare(*n, until))
+        shape.iter().all(|n| self.tables.as_ref().is_none_or(|tables| tables.prepare(*n, until)))
     }
 
-    fn fill(
-        &self,
-        kind: LobeKind,
-        shape: &[f64],
-        places: &[[f64; 2]],
-        values: &mut [f64],
-        derivatives: &mut [Vec<f64>],
-    ) {
+    fn fill(&self, kind: LobeKind, shape: &[f64], places: &[Place], values: &mut [f64], derivatives: &mut [Vec<f64>]) {
         let (&[n], Some(slopes)) = (shape, derivatives.first_mut()) else {
             values.fill(kind.lobe().value(&[], 0.0, &mut []));
             return;
         };
-        // (1 + cos a)/2.
-        let scale = 1.0 / (TAU * (0.5 * self.detector.half).cos().powi(2));
-        let seen = self.tables.at(n);
-        for (i, [alpha, q]) in places.iter().enumerate() {
-            let [u, w, du, dw] = seen.at(*alpha);
-            let (value, slope) = (u + q * w, du + q * dw);
-            values[i] = (n + 2.0) * scale * value;
-            slopes[i] = ((n + 2.0) * slope + value) * scale;
+        let seen = self.seen(n);
+        for (i, place) in places.iter().enumerate() {
+            (values[i], slopes[i]) = Views::new(self, *place).read(n, &seen);
         }
     }
 }
