@@ -28,11 +28,11 @@ const NOISE: [&str; 5] = ["shot noise", "read noise", "quantisation", "axis jitt
 /// Standard deviation of every reading about its mean over draws of one error.
 fn scatter(of: &Experiment, draw: impl Fn(&[Reading], u64) -> Actual + Sync, left_out: &[&str]) -> Vec<f64> {
     let entries: Vec<u32> = (0..of.directions.len() as u32).collect();
-    let readings = series(&of.bare, &of.directions, &entries);
+    let readings = series(&of.described, &of.directions, &entries);
     let one = |seed: u64| {
-        of.with_job(&of.bare, seed, |job| {
+        of.with_job(seed, |job| {
             let raw = Job { left_out, ..*job }.read(readings.clone(), &draw(&readings, seed), Control::silent());
-            reduce("m", &raw, &of.bare, None).expect("reduced").measurement.values
+            reduce("m", &raw, &of.described, None).expect("reduced").measurement.values
         })
     };
     let runs: Vec<Vec<f64>> = (0..DRAWS).into_par_iter().map(one).collect();
@@ -67,7 +67,7 @@ fn check(name: &str) {
         assert!((says / is - 1.0).abs() < 0.1, "{name}, {line}: {says:e} {is:e}");
     };
     for (line, draw) in lines() {
-        compare(line, &scatter(&of, |r, seed| draw(Actual::draw(&of.bare, r, seed)), &NOISE));
+        compare(line, &scatter(&of, |r, seed| draw(Actual::draw(&of.described, r, seed)), &NOISE));
     }
     compare("axis jitter", &scatter(&of, |_, _| Actual::nominal(), &["shot noise", "read noise", "quantisation"]));
 }
@@ -89,7 +89,7 @@ fn noise_is_what_monte_carlo_finds() {
     for name in ["standards-lab", "commercial", "classroom"] {
         let mut of = Experiment::new(name, CLASSES[1].1);
         // Where axes stop at the reference counts as noise of its readings.
-        (of.bare.axes.jitter_deg, of.described.axes.jitter_deg) = (0.0, 0.0);
+        of.described.axes.jitter_deg = 0.0;
         let reduction = of.reduced(1);
         let noise: Vec<usize> = (0..reduction.budget.lines.len() - 1)
             .filter(|k| reduction.budget.lines[*k].name.starts_with("noise"))

@@ -9,9 +9,8 @@ use goniofit::chain;
 use goniofit::control::Control;
 use goniofit::fit::{FitOptions, fit};
 use goniofit::geometry::angles::direction_deg;
-use goniofit::gonio::parts::{Detector, Source};
 use goniofit::gonio::sight::Cones;
-use goniofit::gonio::{ACCURACY, Instrument, Job, Preset, Raw, Reduction, SimulationSpec};
+use goniofit::gonio::{Instrument, Job, Preset, Raw, Reduction, SimulationSpec};
 use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
 use goniofit::numeric::stats::normal_quantile;
 use rayon::prelude::*;
@@ -22,31 +21,17 @@ pub const CLASSES: [(&str, [f64; 3]); 3] =
 
 /// A material on the holder of an instrument.
 pub struct Experiment {
-    /// With cones: what a user describes.
+    /// What a user describes.
     pub described: Instrument,
-    /// The same without cones: readings of what its cones make of the material are those of the described one.
-    pub bare: Instrument,
     pub truth: [f64; 3],
     pub directions: Directions,
-    seen: Seen,
-}
-
-/// A material averaged over the cones of source and aperture, weighed by cosθo.
-struct Seen {
     material: Material,
+    /// Spot, source and aperture, over which readings are means.
     cones: Option<Arc<Cones>>,
 }
 
-impl Seen {
-    fn value(&self, wi: DVec3, wo: DVec3) -> f64 {
-        let mut value = [0.0];
-        match &self.cones {
-            Some(cones) => cones.write_value(&self.material, wi, wo, &mut value),
-            None => self.material.write_value(wi, wo, &mut value),
-        }
-        value[0]
-    }
-}
+/// Relative error of means over spot and cones: far below the noise of any reading.
+const ACCURACY: f64 = 1e-4;
 
 /// What one redrawn instrument's intervals hold.
 pub struct Outcome {
@@ -60,11 +45,6 @@ impl Experiment {
     pub fn new(preset: &str, truth: [f64; 3]) -> Self {
         let spec: SimulationSpec = Preset::find(preset).expect("built in").spec().expect("reads");
         let described = spec.instrument;
-        let bare = Instrument {
-            source: Source { divergence_deg: 0.0, ..described.source },
-            detector: Detector { aperture_deg: 0.0, ..described.detector.clone() },
-            ..described.clone()
-        };
         let [kd, ks, n] = truth;
         let mut lobes = vec![(LobeKind::Lambert, vec![kd], vec![])];
         if ks > 0.0 {
@@ -72,32 +52,37 @@ impl Experiment {
         }
         let material = Material::new(vec!["y".into()], lobes);
         let directions = scan(width(&described, truth));
-        let seen = Seen { material, cones: Cones::of(&described).map(Arc::new) };
-        Self { described, bare, truth, directions, seen }
+        let cones = Cones::of(&described).map(Arc::new);
+        Self { described, truth, directions, material, cones }
     }
 
     /// What each reading stands for.
     pub fn expected(&self, i: usize) -> f64 {
         let (wi, wo) = self.directions.pair(i);
-        self.seen.value(wi, wo)
+        let mut value = [0.0];
+        match &self.cones {
+            Some(cones) => cones.write_value(&self.material, wi, wo, &mut value),
+            None => self.material.write_value(wi, wo, &mut value),
+        }
+        value[0]
     }
 
     /// Raw readings of the instrument of this seed.
     pub fn raw(&self, seed: u64) -> Raw {
-        self.with_job(&self.bare, seed, |job| job.run(Control::silent()))
+        self.with_job(seed, |job| job.run(Control::silent()))
     }
 
-    /// What `work` makes of the job of an instrument without cones.
-    pub fn with_job<T>(&self, instrument: &Instrument, seed: u64, work: impl FnOnce(&Job<'_>) -> T) -> T {
+    /// What `work` makes of the instrument's job.
+    pub fn with_job<T>(&self, seed: u64, work: impl FnOnce(&Job<'_>) -> T) -> T {
         let truth = |wi: DVec3, wo: DVec3, out: &mut [f64]| {
-            out[0] = self.seen.value(wi, wo);
+            self.material.write_value(wi, wo, out);
             true
         };
         work(&Job {
             truth: &truth,
-            lobes: None,
-            channels: &self.seen.material.channels,
-            instrument,
+            lobes: Some(&self.material),
+            channels: &self.material.channels,
+            instrument: &self.described,
             dimension: Dimension::Space,
             directions: &self.directions,
             weights: &Weights::Uniform,
@@ -123,7 +108,7 @@ impl Experiment {
     fn parameters(&self, m: &Measurement, through: bool) -> [Option<bool>; 3] {
         let matte = self.truth[1] == 0.0;
         let model = if matte { "lambert" } else { "lambert+phong" };
-        let sight = self.seen.cones.clone().filter(|_| through).map(|cones| cones as Arc<dyn Sight>);
+        let sight = self.cones.clone().filter(|_| through).map(|cones| cones as Arc<dyn Sight>);
         let plain = FitOptions::new(model.parse().expect("a model"));
         let options = FitOptions { use_sigma: true, through: sight, ..plain };
         let material = fit(m, &options).expect("fits").material;
@@ -145,11 +130,14 @@ pub fn sigma(m: &Measurement, i: usize) -> f64 {
     (own * own + m.common.iter().map(|k| k[i] * k[i]).sum::<f64>()).sqrt()
 }
 
-/// Standard deviation of a lobe as it is seen, degrees: its own and, along one axis, half the half angles of the cones.
+/// Standard deviation of a lobe as it is seen, degrees: its own and, along one axis, half the half angles of cones and spot.
 fn width(instrument: &Instrument, [_, ks, n]: [f64; 3]) -> f64 {
     let cones = [instrument.source.divergence_deg, instrument.detector.aperture_deg].map(|full| (0.25 * full).powi(2));
     let own = if ks > 0.0 { n.sqrt().recip().to_degrees() } else { 10.0 };
-    (own * own + cones.iter().sum::<f64>()).sqrt()
+    let near = |distance: f64| if distance > 0.0 { 1.0 / distance } else { 0.0 };
+    let nearness = near(instrument.source.distance_m) + near(instrument.detector.distance_m);
+    let spot = (0.25 * instrument.source.beam_diameter_m * nearness).to_degrees();
+    (own * own + cones.iter().sum::<f64>() + spot * spot).sqrt()
 }
 
 /// In the plane of incidence at 20° and 45°: about the mirror direction at shares of the lobe's width, and coarsely elsewhere.
