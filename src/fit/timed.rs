@@ -132,7 +132,7 @@ mod tests {
         let value = || {
             let mut value = [f64::NAN];
             let sight = options.through.as_ref().expect("one");
-            sight.fill(LobeKind::Phong, &[3.0], &[[0.1, 1.0]], &mut value, &mut [vec![0.0]]);
+            sight.fill(LobeKind::Phong, &[3.0], &[Place::default()], &mut value, &mut [vec![0.0]]);
             value[0]
         };
         let values: Vec<f64> = (0..6).map(|_| value()).collect();

@@ -18,9 +18,9 @@ pub struct Source {
     /// Full angle of the cone in which light reaches a point of the sample, degrees: of a collimated beam the divergence, of a lamp its diameter
     /// over its distance.
     pub divergence_deg: f64,
-    /// Diameter of the beam across it at the sample, m: a disc of even irradiance; 0 is a spot that is never cut.
+    /// Diameter of the beam across it at the sample, m: a disc of even irradiance; 0 is a point that is never cut.
     pub beam_diameter_m: f64,
-    /// Distance at which irradiance falls as 1/r², m; 0 is a collimated beam, which does not.
+    /// Distance at which irradiance falls as 1/r², m, and from which each point of the spot sees the source; 0 is a collimated beam, which does not.
     pub distance_m: f64,
     /// Full width at half maximum of the triangular band of wavelengths that is lit and read, nm; matters where channels are wavelengths.
     pub bandwidth_nm: f64,
@@ -52,7 +52,8 @@ pub struct Holder {
 pub struct Detector {
     /// Full angle of the cone that the aperture takes in, seen from the sample, degrees.
     pub aperture_deg: f64,
-    /// Distance from the sample, m; 0 is far away. Matters where the sample's height is uncertain.
+    /// Distance from the sample, m; 0 is far away, or behind a lens that sees all of the spot in one direction. Matters to a spot that has a size, and
+    /// where the sample's height is uncertain.
     pub distance_m: f64,
     /// Diameter of the field of view across it at the sample, m; 0 sees all of the sample.
     pub field_diameter_m: f64,

@@ -7,6 +7,9 @@ pub enum Type {
     A,
     /// By other knowledge: certificates, specifications.
     B,
+    /// Of both kinds: all together.
+    #[serde(rename = "A+B")]
+    Both,
 }
 
 impl Type {
@@ -16,6 +19,7 @@ impl Type {
         match self {
             Self::A => "A",
             Self::B => "B",
+            Self::Both => "A+B",
         }
     }
 }
@@ -48,7 +52,7 @@ impl Budget {
         let parts: Vec<_> = parts.into_iter().filter(|(_, _, v)| v.iter().any(|v| *v > 0.0)).collect();
         let total: Vec<f64> = (0..values.len()).map(|i| parts.iter().map(|(_, _, v)| v[i]).sum()).collect();
         let mut lines: Vec<Line> = parts.iter().map(|(name, kind, v)| line(name, *kind, v, values)).collect();
-        lines.push(line("all together", Type::B, &total, values));
+        lines.push(line("all together", Type::Both, &total, values));
         Self { lines, variances: parts.into_iter().map(|(_, _, v)| v).collect() }
     }
 

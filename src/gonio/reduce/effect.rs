@@ -25,6 +25,10 @@ pub(super) struct Effect {
     parts: Vec<(f64, f64)>,
     /// The mean of what each axis' jitter does.
     shifts: Vec<f64>,
+    /// What every two axes' jitter do together, 1 σ, where it matters.
+    twists: Vec<f64>,
+    /// The square of a mean shift that is not taken off.
+    left: f64,
     bend: Option<Bend>,
     whole: Option<f64>,
 }
@@ -35,7 +39,8 @@ impl Effect {
         let linear = self.parts.iter().map(|(u, _)| u * u).sum();
         let squares = |list: &[(f64, f64)]| list.iter().map(|(_, q)| q * q).sum::<f64>();
         let bent = self.bend.as_ref().map_or_else(|| 3.0 * squares(&self.parts[..kept]), Bend::variance);
-        (linear, bent + SCATTER * squares(&self.parts[kept..]))
+        let twisted: f64 = self.twists.iter().map(|h| h * h).sum();
+        (linear, bent + SCATTER * squares(&self.parts[kept..]) + twisted + self.left)
     }
 
     /// What jitter's squares change a reading by on average: jitter blurs, and lowers a peak. A model whose change is as large as the value tells nothing.
@@ -53,7 +58,8 @@ impl Effect {
     /// What each axis' jitter does, 1 σ: in proportion, and by its square.
     fn of_stop(&self, kept: usize) -> Vec<f64> {
         let factor = self.factor(kept).sqrt();
-        self.parts[kept..].iter().flat_map(|(u, q)| [factor * u, factor * SCATTER.sqrt() * q]).collect()
+        let alone = self.parts[kept..].iter().flat_map(|(u, q)| [factor * u, factor * SCATTER.sqrt() * q]);
+        alone.chain(self.twists.iter().map(|h| factor * h)).collect()
     }
 
     /// The factor of both that makes them the whole.
@@ -92,17 +98,26 @@ pub(super) fn effects(
     let shifts = |(c, value): (usize, &f64)| {
         (kept..errors.len()).map(|k| net(scale, *value, list[k][c], reference[k]).1).collect()
     };
-    let mut effects: Vec<Effect> = values
-        .iter()
-        .enumerate()
-        .map(|of| Effect { parts: parts(of), shifts: shifts(of), bend: None, whole: None })
-        .collect();
-    if kept > 0 && effects.iter().any(|e| e.share(kept) > CURVED) {
-        let alone: Vec<Vec<f64>> = list[..kept].iter().map(|of| of.iter().map(|(_, q)| *q).collect()).collect();
-        let products = optics.products(pair, &errors[..kept], &alone, model, values.len());
-        for (c, effect) in effects.iter_mut().enumerate() {
+    let effect = |of: (usize, &f64)| {
+        let twists = Vec::new();
+        let effect = Effect { parts: parts(of), shifts: shifts(of), twists, left: 0.0, bend: None, whole: None };
+        let left = effect.shifts.iter().sum::<f64>() - effect.shift(*of.1);
+        Effect { left: left * left, ..effect }
+    };
+    let mut effects: Vec<Effect> = values.iter().enumerate().map(effect).collect();
+    if effects.iter().all(|e| e.share(kept) <= CURVED) {
+        return effects;
+    }
+    let products = |of: std::ops::Range<usize>| {
+        let alone: Vec<Vec<f64>> = list[of.clone()].iter().map(|of| of.iter().map(|(_, q)| *q).collect()).collect();
+        optics.products(pair, &errors[of], &alone, model, values.len())
+    };
+    let (of_kept, of_jitter) = (products(0..kept), products(kept..errors.len()));
+    for (c, effect) in effects.iter_mut().enumerate() {
+        effect.twists = of_jitter.iter().map(|of| scale * of[c] / stops.sqrt()).collect();
+        if kept > 0 {
             let squares = effect.parts[..kept].iter().map(|(_, q)| *q).collect();
-            effect.bend = Some(Bend { squares, products: products.iter().map(|of| scale * of[c]).collect() });
+            effect.bend = Some(Bend { squares, products: of_kept.iter().map(|of| scale * of[c]).collect() });
         }
     }
     effects
@@ -141,6 +156,10 @@ pub(super) fn place_all(list: &[(usize, Effect)], errors: &[Off], shared: &mut S
     let kept = kept(errors);
     for (place, effect) in list {
         let factor = effect.factor(kept);
+        let twisted: f64 = effect.twists.iter().map(|h| h * h).sum();
+        if twisted + effect.left > 0.0 {
+            shared.add_own(JITTER, *place, factor * (twisted + effect.left));
+        }
         for (k, ((family, _, _), (u, q))) in errors.iter().zip(&effect.parts).enumerate() {
             if k >= kept {
                 shared.add_own(*family, *place, factor * (u * u + SCATTER * q * q));

@@ -185,19 +185,22 @@ impl<'a> Shared<'a> {
             self.add_grouped(BASE, part.number, channel, place, u);
         }
         self.add(CERTIFICATE, (0, 0), place, value * self.instrument.reference.reflectance_u);
-        let drift = self.instrument.source.drift_per_sqrt_hour;
-        let has_reference = self.has_reference;
+        // Stray light drifts with the source, between visits to the blank.
+        let instrument = self.instrument;
+        let stray = conversion * instrument.gain() * instrument.surroundings.stray_per_sr;
+        let (drift, has_reference) = (instrument.source.drift_per_sqrt_hour, self.has_reference);
         if has_reference {
-            self.bridge(DRIFT, place, &at.reference_gap, value * drift);
+            self.bridge(DRIFT, place, &at.reference_gap, (value + stray) * drift);
         } else {
             // Nothing tells how far the power has walked since the start.
             self.walk(DRIFT, place, of.time_s, value * drift);
+            self.bridge(DRIFT, place, &at.base_gap, stray * drift);
         }
         self.bridge(DARK, place, &at.base_gap, conversion * self.instrument.detector.dark_drift_per_sqrt_hour);
         let detector = &self.instrument.detector;
         if detector.nonlinearity_u > 0.0 {
-            let of_reference = if has_reference { value * at.reference_signal } else { 0.0 };
-            let bent = conversion * rate.mean * rate.signal - of_reference;
+            let of_reference = if has_reference { value / at.reference * at.reference_bent } else { 0.0 };
+            let bent = conversion * (rate.mean * rate.signal - at.base_bent) - of_reference;
             self.add(NONLINEARITY, (0, 0), place, detector.nonlinearity_u / detector.full_well * bent);
         }
     }

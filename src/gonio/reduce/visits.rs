@@ -22,6 +22,13 @@ struct Point {
     number: usize,
 }
 
+impl Point {
+    /// By how much its rate changes with the detector's nonlinearity, for a full well of 1.
+    fn bent(&self) -> f64 {
+        self.mean * self.signal
+    }
+}
+
 /// The readings of one kind around a moment.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Gap {
@@ -68,8 +75,9 @@ pub(super) struct At {
     /// What both are made from.
     pub base_parts: Vec<BasePart>,
     pub reference_parts: Vec<ReferencePart>,
-    /// Signal of one reading of the reference.
-    pub reference_signal: f64,
+    /// By how much base and reference change with the detector's nonlinearity: rate times signal, for a full well of 1.
+    pub base_bent: f64,
+    pub reference_bent: f64,
     /// Where the moment lies between readings of the base, and of the reference.
     pub base_gap: Gap,
     pub reference_gap: Gap,
@@ -152,26 +160,28 @@ impl Visits {
     pub fn at(&self, time_s: f64, channel: usize) -> At {
         let (base_list, reference_list) = (&self.base[channel], &self.reference[channel]);
         let (base, around, base_gap) = interpolated(base_list, time_s);
-        let mut base_parts = Vec::with_capacity(4);
+        let (mut base_parts, mut base_bent) = (Vec::with_capacity(4), 0.0);
         for (i, share) in around {
+            base_bent += share * base_list[i].bent();
             add_part(&mut base_parts, base_list, i, (share, 0.0));
         }
-        let (mut reference, mut reference_parts) = (0.0, Vec::with_capacity(2));
+        let (mut reference, mut reference_bent, mut reference_parts) = (0.0, 0.0, Vec::with_capacity(2));
         let (_, around, reference_gap) = interpolated(reference_list, time_s);
         for (i, share) in around {
             let point = reference_list[i];
             let (under, of_base, _) = interpolated(base_list, point.time_s);
             reference += share * (point.mean - under);
+            reference_bent += share * point.bent();
             reference_parts.push(ReferencePart { number: point.number, share, sigma: point.variance.sqrt() });
             for (k, part) in of_base {
                 add_part(&mut base_parts, base_list, k, (0.0, share * part));
+                reference_bent -= share * part * base_list[k].bent();
             }
         }
-        let reference_signal = around.into_iter().next().map_or(0.0, |(i, _)| reference_list[i].signal);
         if reference_list.is_empty() {
             reference = 1.0;
         }
-        At { base, reference, base_parts, reference_parts, reference_signal, base_gap, reference_gap }
+        At { base, reference, base_parts, reference_parts, base_bent, reference_bent, base_gap, reference_gap }
     }
 }
 
