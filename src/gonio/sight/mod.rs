@@ -48,11 +48,13 @@ struct Finesse {
     order: (f64, f64),
     /// The finest that is made.
     most: usize,
+    /// The share of the narrower cone's half angle that a lobe is no narrower than, as it is seen through both.
+    blurred: f64,
 }
 
-const FINE: Finesse = Finesse { error: 1e-9, order: (2.3, 2.8), most: FINEST };
+const FINE: Finesse = Finesse { error: 1e-9, order: (2.3, 2.8), most: FINEST, blurred: 0.0 };
 /// As long as a lobe is no narrower than a tenth of the smear.
-const ROUGH: Finesse = Finesse { error: 1e-4, order: (0.7, 1.35), most: 14 };
+const ROUGH: Finesse = Finesse { error: 1e-4, order: (0.7, 1.35), most: 14, blurred: 0.5 };
 /// Widths 1/√n from its peak where a lobe is nothing.
 const NOWHERE: f64 = 9.0;
 
@@ -217,8 +219,9 @@ impl<'a> Views<'a> {
         if alpha > self.cones.source.half + self.cones.detector.half + smear + NOWHERE / n.sqrt() {
             return smooth;
         }
-        let (least, per_width) = self.cones.finesse.order;
-        ((least + per_width * smear * n.sqrt()).ceil() as usize).min(self.cones.finesse.most).max(smooth)
+        let Finesse { order: (least, per_width), most, blurred, .. } = self.cones.finesse;
+        let width = n.sqrt().recip().hypot(blurred * self.cones.source.half.min(self.cones.detector.half));
+        ((least + per_width * smear / width).ceil() as usize).min(most).max(smooth)
     }
 }
 
