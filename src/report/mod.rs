@@ -5,3 +5,6 @@
 //! without scripts, or on paper, still shows it.
 
 pub mod plot;
+pub mod run;
+pub mod views;
+mod words;

@@ -6,10 +6,9 @@ use std::sync::Arc;
 use super::args::{Args, Wanted};
 use crate::brdf::{Sight, SpecError};
 use crate::cli::failure::Failure;
-use crate::cli::instrument::read_instrument;
+use crate::cli::instrument::read_sight;
 use crate::cli::output::keeps_inputs;
 use crate::fit::{Bootstrap, FitOptions, Limit};
-use crate::gonio::sight::Cones;
 
 impl Args {
     /// The fit's options.
@@ -45,15 +44,7 @@ impl Args {
 
     /// What lobes are seen through.
     fn sight(&self) -> Result<Option<Arc<dyn Sight>>, Failure> {
-        let Some(name) = &self.through else { return Ok(None) };
-        let instrument = read_instrument(name)?;
-        match Cones::of(&instrument) {
-            Some(cones) => Ok(Some(Arc::new(cones))),
-            None => Err(Failure::usage(format!(
-                "--through {name}: expected an instrument with an aperture (instrument.detector.aperture_deg) or a divergence \
-                 (instrument.source.divergence_deg), found points, through which a fit is the plain one"
-            ))),
-        }
+        self.through.as_deref().map(read_sight).transpose()
     }
 
     /// The option that limit `i` of all was typed with.

@@ -114,7 +114,7 @@ fn wrapped(color: usize) -> usize {
 pub(in crate::report) fn line_class(color: usize) -> String {
     match (color, wrapped(color)) {
         (REFERENCE, _) => "ref".into(),
-        (_, c @ 0..2) => format!("line s{c}"),
+        (_, c @ (0 | 2)) => format!("line s{c}"),
         (_, c) => format!("line s{c} dash-{c}"),
     }
 }
@@ -142,11 +142,10 @@ impl Chart {
         area.frame(&mut canvas, &axis(&self.x_label, self.x, across), &axis(&self.y_label, self.y, 6), true);
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, &area, s)));
         draw_legend(&mut canvas, &rows, 10.0, height + 8.0);
-        let scale = |s: Scale| format!("{} {} {}", s.low, s.high, if s.log { "log" } else { "linear" });
         Figure::new(canvas, &self.title, &self.description)
             .with_data("area", area.data())
-            .with_data("x", scale(self.x))
-            .with_data("y", scale(self.y))
+            .with_data("x", self.x.data())
+            .with_data("y", self.y.data())
     }
 
     fn draw(&self, canvas: &mut Canvas, area: &Area, series: &Series) {

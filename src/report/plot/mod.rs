@@ -21,7 +21,8 @@ pub use heat::HeatMap;
 pub use loglog::{LogLog, Slope};
 pub use polar::PolarChart;
 pub use raster::RasterError;
-pub use scale::{Scale, Tick};
+pub use scale::{Scale, Spacing, Tick};
+pub(in crate::report) use scale::minus;
 pub use style::{DARK, LIGHT, page_css};
 
 use askama::Template;
@@ -54,6 +55,21 @@ impl Figure {
     pub(in crate::report) fn with_data(mut self, name: &str, value: impl std::fmt::Display) -> Self {
         self.data.push((name.to_owned(), value.to_string()));
         self
+    }
+
+    /// Figures side by side, `columns` in a row.
+    #[must_use]
+    pub fn grid(figures: &[Self], columns: usize, title: &str) -> Self {
+        let columns = columns.clamp(1, figures.len().max(1));
+        let width = figures.iter().map(|f| f.canvas.width).fold(0.0, f64::max);
+        let height = figures.iter().map(|f| f.canvas.height).fold(0.0, f64::max);
+        let rows = figures.len().div_ceil(columns);
+        let mut canvas = Canvas::new(width * columns as f64, height * rows as f64);
+        for (k, figure) in figures.iter().enumerate() {
+            canvas.place(&figure.canvas, (width * (k % columns) as f64, height * (k / columns) as f64));
+        }
+        let described: Vec<String> = figures.iter().map(|f| format!("{}: {}", f.title, f.description)).collect();
+        Self::new(canvas, title, described.join(". "))
     }
 
     /// Width and height, in units of a CSS pixel.
