@@ -97,7 +97,10 @@ mod tests {
     fn numbers_read_well() {
         assert_eq!([number(0.0), number(1.0), number(90.016), number(-0.05)], ["0", "1", "90.02", "−0.05"]);
         assert_eq!([number(7.374e-4), number(f64::NAN), number(2e7)], ["7.374·10⁻⁴", "–", "2.000·10⁷"]);
-        assert_eq!([percent(0.1874), percent(0.99998), percent(2e-5), percent(1.0)], ["18.7 %", "99.998 %", "0.002 %", "100 %"]);
+        assert_eq!(
+            [percent(0.1874), percent(0.99998), percent(2e-5), percent(1.0)],
+            ["18.7 %", "99.998 %", "0.002 %", "100 %"]
+        );
         assert_eq!([time(0.0093), time(3.2), time(2e-5)], ["9.3 ms", "3.2 s", "20 µs"]);
         assert_eq!([count(5), count(22050), count(1458000)], ["5", "22\u{202f}050", "1\u{202f}458\u{202f}000"]);
         assert_eq!(to_error(0.320032, 0.000049), ("0.320032".into(), "0.000049".into()));

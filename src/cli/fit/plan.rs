@@ -1,6 +1,6 @@
 //! From what was typed to a plan: the options of the fit, and where each result goes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::args::{Args, Wanted};
@@ -56,9 +56,18 @@ impl Args {
 /// Where each fit goes, checked before anything is read: no fit goes where a measurement or another fit is.
 pub(super) fn targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
     let targets = named_targets(args)?;
+    if args.report && targets.iter().any(|t| t.as_deref().is_none_or(|t| t == Path::new("-"))) {
+        return Err(Failure::usage(
+            "--report: expected --out FIT.json or --out-dir D, beside which the page is written",
+        ));
+    }
     let option = if args.out_dir.is_some() { "--out-dir" } else { "--out" };
     for target in targets.iter().flatten() {
-        keeps_inputs(option, target, args.files.iter().map(PathBuf::as_path))?;
+        let inputs = || args.files.iter().map(PathBuf::as_path);
+        keeps_inputs(option, target, inputs())?;
+        if args.report {
+            keeps_inputs("--report", &target.with_extension("html"), inputs())?;
+        }
     }
     Ok(targets)
 }

@@ -12,8 +12,8 @@ use crate::cli::info::Reading;
 use crate::measurement::{Measurement, formats};
 use crate::report::plot::Figure;
 use crate::report::views::{
-    Binned, Predicted, Slice, Statistic, coverage as covered, coverage_figure, default_channel, incidences, polar_figure,
-    residual_figure, residual_maps, residual_range, scale_of, slice, slice_figure,
+    Binned, Predicted, Slice, Statistic, coverage as covered, coverage_figure, default_channel, incidences,
+    polar_figure, residual_figure, residual_maps, residual_range, scale_of, slice, slice_figure,
 };
 
 #[derive(Debug, clap::Args)]
@@ -100,10 +100,12 @@ pub(super) fn curves(args: &CurveArgs, polar: bool) -> Result<Drawn, Failure> {
 }
 
 fn slice_json(slice: &Slice, channel: usize) -> Value {
-    let curve = |c: &crate::report::views::Curve| json!({
-        "name": c.name, "theta_o_deg": c.theta_o_deg, "value": c.values[channel],
-        "sigma": c.sigma.as_ref().map(|s| &s[channel]),
-    });
+    let curve = |c: &crate::report::views::Curve| {
+        json!({
+            "name": c.name, "theta_o_deg": c.theta_o_deg, "value": c.values[channel],
+            "sigma": c.sigma.as_ref().map(|s| &s[channel]),
+        })
+    };
     json!({ "theta_i_deg": slice.incidence_deg, "curves": slice.curves.iter().map(curve).collect::<Vec<_>>() })
 }
 
@@ -129,10 +131,12 @@ pub(super) fn residuals(args: &ResidualArgs) -> Result<Drawn, Failure> {
         residual_figure(map, *over_half, statistic, range, (&material.model(), maps.unit), true)
     };
     let panels: Vec<Figure> = all.iter().map(draw).collect();
-    let of = |(map, over_half): &(&Binned, bool)| json!({
-        "over": if *over_half { ["theta_h", "theta_d"] } else { ["theta_i", "theta_o"] },
-        "columns_deg": map.x_deg, "rows_deg": map.y_deg, "count": map.count, "value": map.values(statistic),
-    });
+    let of = |(map, over_half): &(&Binned, bool)| {
+        json!({
+            "over": if *over_half { ["theta_h", "theta_d"] } else { ["theta_i", "theta_o"] },
+            "columns_deg": map.x_deg, "rows_deg": map.y_deg, "count": map.count, "value": map.values(statistic),
+        })
+    };
     let object = json!({
         "values": maps.count, "rmse": maps.rmse, "unit": maps.unit,
         "statistic": if args.rms { "rms" } else { "mean" }, "maps": all.iter().map(of).collect::<Vec<_>>(),

@@ -74,7 +74,8 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     };
     output.write(&figure)?;
     object["out"] = json!(output.out);
-    let said = if output.out == Path::new("-") { String::new() } else { format!("written to {}", output.out.display()) };
+    let said =
+        if output.out == Path::new("-") { String::new() } else { format!("written to {}", output.out.display()) };
     ui.result(&said, &object);
     Ok(())
 }

@@ -22,12 +22,15 @@ impl Subjects {
             match chain::load(file, options)? {
                 Source::Fitted(material) => found.materials.push((name_of(file), Predicted::new(&material, None))),
                 Source::Measured(_) if found.table.is_some() => {
-                    return Err(Failure::usage(format!("{file}: expected one measurement and fits of it, found another")));
+                    return Err(Failure::usage(format!(
+                        "{file}: expected one measurement and fits of it, found another"
+                    )));
                 }
                 Source::Measured(table) => {
                     let all: Vec<usize> = (0..table.channels.len()).collect();
                     // A table that can't be interpolated is shown by its readings alone.
-                    let brdf = if table.dimension == Dimension::Flat { None } else { TableBrdf::new(&table, &all).ok() };
+                    let brdf =
+                        if table.dimension == Dimension::Flat { None } else { TableBrdf::new(&table, &all).ok() };
                     found.table = Some((*table, brdf));
                 }
             }

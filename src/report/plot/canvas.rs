@@ -46,7 +46,10 @@ pub(in crate::report) enum Mark {
         y: Px,
     },
     /// What follows up to [`Mark::End`] is drawn this far to the right and down.
-    Shift { x: Px, y: Px },
+    Shift {
+        x: Px,
+        y: Px,
+    },
     End,
 }
 

@@ -93,7 +93,13 @@ impl HeatMap {
 
     /// The scale of colours, on the right.
     fn bar(&self, canvas: &mut Canvas, area: &Area) {
-        color_bar(canvas, self.map, Scale::linear(self.range.0, self.range.1), &self.color_label, (area.right() + 18.0, area.top, area.height));
+        color_bar(
+            canvas,
+            self.map,
+            Scale::linear(self.range.0, self.range.1),
+            &self.color_label,
+            (area.right() + 18.0, area.top, area.height),
+        );
     }
 }
 

@@ -16,14 +16,16 @@ mod scale;
 mod style;
 
 pub use chart::{Chart, LegendPlace, Marks, Point, Series};
+pub(in crate::report) use chart::{dot_class, line_class};
 pub use disc::{Disc, DiscCell};
 pub use heat::HeatMap;
+pub(in crate::report) use heat::hex;
 pub use loglog::{LogLog, Slope};
 pub use polar::PolarChart;
 pub use raster::RasterError;
-pub use scale::{Scale, Spacing, Tick};
 pub(in crate::report) use scale::minus;
-pub use style::{DARK, LIGHT, page_css};
+pub use scale::{Scale, Spacing, Tick};
+pub(in crate::report) use style::{DARK, LIGHT, page_css, variables};
 
 use askama::Template;
 use canvas::Canvas;

@@ -209,7 +209,10 @@ mod tests {
     fn ticks_are_round_and_inside() {
         assert_eq!(labels(Scale::linear(0.0, 1.0), 5), ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
         assert_eq!(labels(Scale::degrees(-90.0, 90.0), 6), ["−90", "−60", "−30", "0", "30", "60", "90"]);
-        assert_eq!(labels(Scale { low: 0.01, high: 100.0, spacing: Spacing::Log }, 5), ["0.01", "0.1", "1", "10", "100"]);
+        assert_eq!(
+            labels(Scale { low: 0.01, high: 100.0, spacing: Spacing::Log }, 5),
+            ["0.01", "0.1", "1", "10", "100"]
+        );
         assert_eq!(labels(Scale { low: 1e-5, high: 1e-4, spacing: Spacing::Log }, 5).first().expect("one"), "10^{−5}");
         for scale in [Scale::around([0.013, 7.2]), Scale::log_around([3e-4, 20.0], 8.0)] {
             for tick in scale.ticks(5) {

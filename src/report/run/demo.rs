@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::{Kind, ReportError, Run, RunFit, RunOptions, Table, Through, made, picture, stopped};
+use super::{Kind, Made, ReportError, Run, RunFit, RunOptions, Table, Through, picture, stopped};
 use crate::brdf::Material;
 use crate::chain::ChainError;
 use crate::gonio::sight::Cones;
@@ -15,7 +15,7 @@ use crate::report::views::Predicted;
 pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Result<Run, ReportError> {
     let path = options.measurement.clone().unwrap_or_else(|| folder.join("measurement.csv"));
     let instrument = numbers["instrument"].as_str().map(str::to_owned);
-    let made = made(numbers);
+    let made = Made::of(&numbers["run"]);
     let own = instrument.as_deref().and_then(|name| find(name, made.folder.as_deref()));
     let truth = material(folder, &numbers["truth"])?;
     let mut fits = Vec::new();

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+pub(in crate::report) use demo::find as instrument;
 pub use error::ReportError;
 pub use table::Table;
 
@@ -147,7 +148,14 @@ impl Run {
 
     /// A measurement and one fit of it, as `fit` has them at hand.
     #[must_use]
-    pub fn of_fit(path: &Path, measurement: Measurement, file: &str, material: &Material, through: Through, made: Made) -> Self {
+    pub fn of_fit(
+        path: &Path,
+        measurement: Measurement,
+        file: &str,
+        material: &Material,
+        through: Through,
+        made: Made,
+    ) -> Self {
         let label = material.model();
         let table = Table::new(path, measurement);
         Self {
@@ -191,14 +199,16 @@ fn json(path: &Path) -> Result<Value, ReportError> {
     serde_json::from_str(&text).map_err(|source| ReportError::Json { path: path.into(), source })
 }
 
-/// How the numbers say that the run was asked for.
-fn made(numbers: &Value) -> Made {
-    let run = &numbers["run"];
-    let words = run["command"].as_array().into_iter().flatten();
-    Made {
-        program: run["program"].as_str().map(str::to_owned),
-        command: words.filter_map(|w| w.as_str().map(str::to_owned)).collect(),
-        folder: run["folder"].as_str().map(PathBuf::from),
+impl Made {
+    /// As `run` in `numbers.json` says it.
+    #[must_use]
+    pub fn of(run: &Value) -> Self {
+        let words = run["command"].as_array().into_iter().flatten();
+        Self {
+            program: run["program"].as_str().map(str::to_owned),
+            command: words.filter_map(|w| w.as_str().map(str::to_owned)).collect(),
+            folder: run["folder"].as_str().map(PathBuf::from),
+        }
     }
 }
 

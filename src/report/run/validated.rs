@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{Kind, ReportError, Run, RunFit, RunOptions, Table, found, made, picture, stopped};
+use super::{Kind, Made, ReportError, Run, RunFit, RunOptions, Table, found, picture, stopped};
 use crate::chain::load_material;
 use crate::report::views::Predicted;
 
 pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Result<Run, ReportError> {
-    let made = made(numbers);
+    let made = Made::of(&numbers["run"]);
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let typed = text(&numbers["measurement"]);
     let path = options.measurement.clone().unwrap_or_else(|| found(&typed, &made, folder));
@@ -21,7 +21,9 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Resu
     }
     let mut notes: Vec<String> = stopped(numbers).into_iter().collect();
     if let Some(reason) = numbers["table_not_rendered"].as_str() {
-        notes.push(format!("The table itself could not be rendered ({reason}); pictures are of the fits, each compared with the first."));
+        notes.push(format!(
+            "The table itself could not be rendered ({reason}); pictures are of the fits, each compared with the first."
+        ));
     }
     let entries: Vec<&Value> = numbers["fits"].as_array().into_iter().flatten().collect();
     let models: Vec<String> = entries.iter().map(|e| text(&e["model"])).collect();

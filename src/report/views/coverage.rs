@@ -199,7 +199,8 @@ mod tests {
 
     #[test]
     fn masked_values_are_counted_where_they_are() {
-        let mut table = listed([(30.0, 0.0, 0.0), (30.0, 40.0, 0.0), (30.0, 40.0, 90.0), (30.0, 95.0, 0.0)].into_iter());
+        let mut table =
+            listed([(30.0, 0.0, 0.0), (30.0, 40.0, 0.0), (30.0, 40.0, 90.0), (30.0, 95.0, 0.0)].into_iter());
         table.values[1] = f64::NAN;
         let cover = coverage(&table).expect("of space");
         assert!((cover.masked - 1.0 / 3.0).abs() < 1e-12, "{}", cover.masked);

@@ -33,7 +33,8 @@ pub fn albedo_curves(table: Option<&[Scatter]>, materials: &[(String, &Material,
     };
     let of = |(name, material, color): &(String, &Material, usize)| {
         let theta_deg: Vec<f64> = (0..90).map(f64::from).collect();
-        let rows: Option<Vec<Vec<f64>>> = theta_deg.iter().map(|t| material.directional_albedo(t.to_radians())).collect();
+        let rows: Option<Vec<Vec<f64>>> =
+            theta_deg.iter().map(|t| material.directional_albedo(t.to_radians())).collect();
         let rows = rows?;
         let albedo = (0..material.channels.len()).map(|c| rows.iter().map(|row| row[c]).collect()).collect();
         Some(AlbedoCurve { name: name.clone(), color: *color, measured: false, theta_deg, albedo })

@@ -82,10 +82,7 @@ mod tests {
     #[test]
     fn values_are_the_materials_and_a_wide_view_lowers_the_peak() {
         let channels = vec!["a".to_owned(), "b".to_owned()];
-        let lobes = vec![
-            (LobeKind::Lambert, vec![0.3, 0.1], vec![]),
-            (LobeKind::Phong, vec![0.2, 0.4], vec![200.0]),
-        ];
+        let lobes = vec![(LobeKind::Lambert, vec![0.3, 0.1], vec![]), (LobeKind::Phong, vec![0.2, 0.4], vec![200.0])];
         let material = Material::new(channels, lobes);
         let pairs: Vec<_> = [0.0, 0.3, 0.5].iter().map(|t| (direction(0.5, PI), direction(*t, 0.0))).collect();
         let plain = Predicted::new(&material, None).values(&pairs);

@@ -77,11 +77,9 @@ impl Binned {
 
     fn join(&mut self, other: &Self) {
         self.count.iter_mut().zip(&other.count).for_each(|(a, b)| *a += b);
-        for (a, b) in [
-            (&mut self.weight, &other.weight),
-            (&mut self.sum, &other.sum),
-            (&mut self.squares, &other.squares),
-        ] {
+        for (a, b) in
+            [(&mut self.weight, &other.weight), (&mut self.sum, &other.sum), (&mut self.squares, &other.squares)]
+        {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         }
     }
@@ -103,7 +101,14 @@ impl Binned {
 pub fn residual_maps(table: &Measurement, fit: &Predicted, max_angle_deg: f64) -> ResidualMaps {
     let record = fit.material().fit.clone().unwrap_or_default();
     let loss = Loss::from_name(&record.loss).unwrap_or_default();
-    let judge = Judge { table, fit, loss, epsilon: &record.relative_epsilon, max_angle_deg, by_area: record.weights != "uniform" };
+    let judge = Judge {
+        table,
+        fit,
+        loss,
+        epsilon: &record.relative_epsilon,
+        max_angle_deg,
+        by_area: record.weights != "uniform",
+    };
     let bins = Bins::of(table);
     let parts = map_blocks(table.len(), |block| judge.bin(block, &bins));
     let (mut maps, mut totals) = (bins.empty(table.channels.len()), Totals::default());
@@ -157,7 +162,9 @@ fn joined(maps: Vec<Binned>, channels: usize, totals: &Totals) -> [Binned; 2] {
             Some(all) => all.iter_mut().zip(&pair).for_each(|(a, b)| a.join(b)),
         }
     }
-    all.unwrap_or_else(|| [Binned::new(vec![0.0, 90.0], vec![0.0, 90.0]), Binned::new(vec![0.0, 90.0], vec![-90.0, 90.0])])
+    all.unwrap_or_else(|| {
+        [Binned::new(vec![0.0, 90.0], vec![0.0, 90.0]), Binned::new(vec![0.0, 90.0], vec![-90.0, 90.0])]
+    })
 }
 
 /// Borders of the cells.
@@ -333,7 +340,8 @@ mod tests {
         let material = BuiltInMaterial::find("glossy-paint").expect("built in").material();
         let scan = Scan::Hemisphere { step_deg: 10.0 };
         let instrument = Instrument::default();
-        measure("paint", &Source::Fitted(Box::new(material)), &instrument, &scan, 1, Control::silent()).expect("measures")
+        measure("paint", &Source::Fitted(Box::new(material)), &instrument, &scan, 1, Control::silent())
+            .expect("measures")
     }
 
     #[test]
@@ -345,11 +353,20 @@ mod tests {
                 let material = fit(&table, &options).expect("fits").material;
                 let record = material.fit.clone().expect("a record");
                 let maps = residual_maps(&table, &Predicted::new(&material, None), 80.0);
-                assert!((maps.rmse / record.rmse - 1.0).abs() < 1e-6, "{model} {loss:?}: {} vs {}", maps.rmse, record.rmse);
+                assert!(
+                    (maps.rmse / record.rmse - 1.0).abs() < 1e-6,
+                    "{model} {loss:?}: {} vs {}",
+                    maps.rmse,
+                    record.rmse
+                );
                 for map in [maps.half_diff.as_ref().expect("of space"), &maps.in_out] {
                     let (count, squares): (u64, f64) = (map.count.iter().sum(), map.squares.iter().sum());
                     assert_eq!(count, maps.count);
-                    assert!((squares / record.cost - 1.0).abs() < 1e-6, "{model} {loss:?}: {squares} vs {}", record.cost);
+                    assert!(
+                        (squares / record.cost - 1.0).abs() < 1e-6,
+                        "{model} {loss:?}: {squares} vs {}",
+                        record.cost
+                    );
                 }
             }
         }
@@ -365,7 +382,8 @@ mod tests {
         let maps = residual_maps(&table, &Predicted::new(&material, None), 80.0);
         let map = &maps.in_out;
         let columns = map.x_deg.len() - 1;
-        let (column, row) = (map.x_deg.partition_point(|b| *b <= 30.0) - 1, map.y_deg.partition_point(|b| *b <= -20.0) - 1);
+        let (column, row) =
+            (map.x_deg.partition_point(|b| *b <= 30.0) - 1, map.y_deg.partition_point(|b| *b <= -20.0) - 1);
         let (mut sum, mut squares, mut weights, mut count) = ([0.0; 3], [0.0; 3], [0.0; 3], 0);
         let mut totals = [(0.0, 0.0); 3];
         for i in 0..table.len() {
@@ -392,7 +410,9 @@ mod tests {
         let all = |list: [f64; 3]| (0..3).map(|c| list[c] * totals[c].1 / totals[c].0).sum::<f64>();
         let cell = row * columns + column;
         assert_eq!(map.count[cell], count);
-        for (found, want) in [(map.sum[cell], all(sum)), (map.squares[cell], all(squares)), (map.weight[cell], all(weights))] {
+        for (found, want) in
+            [(map.sum[cell], all(sum)), (map.squares[cell], all(squares)), (map.weight[cell], all(weights))]
+        {
             assert!((found / want - 1.0).abs() < 1e-10, "{found} vs {want}");
         }
         let mean = map.values(Statistic::Mean)[cell].expect("filled");

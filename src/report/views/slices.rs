@@ -285,7 +285,10 @@ mod tests {
     fn the_tables_own_incidences_are_shown_where_they_are_few() {
         let wi: Vec<DVec3> = (0..18).map(|k| direction_deg(5.0 * f64::from(k), 0.0)).collect();
         let table = Measurement::new("t", Directions::List { wo: wi.clone(), wi }, vec!["x".into()], vec![1.0; 18]);
-        assert_eq!(incidences(Some(&table), 6), [0.0, 15.0, 30.0, 45.0, 60.0, 80.0].map(|t: f64| if t == 45.0 { 45.0 } else { t }));
+        assert_eq!(
+            incidences(Some(&table), 6),
+            [0.0, 15.0, 30.0, 45.0, 60.0, 80.0].map(|t: f64| if t == 45.0 { 45.0 } else { t })
+        );
         assert_eq!(incidences(None, 6), [0.0, 15.0, 30.0, 45.0, 60.0, 75.0]);
     }
 }

@@ -1,0 +1,276 @@
+//! The fits in tables: parameters, residuals, correlations, models compared.
+
+use crate::brdf::{FitRecord, LobeKind, Material, PerChannel};
+use crate::fit::Loss;
+use crate::image::ColorMap;
+use crate::measurement::Dimension;
+use crate::report::plot::hex;
+use crate::report::run::{Run, RunFit};
+use crate::report::words::{count, number, percent, time, to_error};
+
+/// A parameter of a fit.
+pub(super) struct Cell {
+    pub value: String,
+    /// Standard error, where it has one.
+    pub error: Option<String>,
+    /// 95 % interval, or what is to be said instead.
+    pub note: String,
+    /// How far from the truth, standard errors.
+    pub off: Option<String>,
+}
+
+/// A parameter in all fits.
+pub(super) struct Row {
+    pub name: String,
+    pub unit: &'static str,
+    pub truth: Option<String>,
+    pub cells: Vec<Option<Cell>>,
+}
+
+/// A figure of merit in all fits.
+pub(super) struct Merit {
+    pub name: &'static str,
+    pub cells: Vec<String>,
+}
+
+/// A coloured cell of a correlation matrix.
+pub(super) struct Shade {
+    pub text: String,
+    pub style: String,
+}
+
+pub(super) struct Correlations {
+    pub label: String,
+    pub names: Vec<String>,
+    pub rows: Vec<(String, Vec<Shade>)>,
+    /// The strongest pair, in words.
+    pub strongest: String,
+}
+
+/// Models that `--model auto` compared.
+pub(super) struct Choice {
+    pub label: String,
+    pub reason: String,
+    pub rows: Vec<ChoiceRow>,
+}
+
+pub(super) struct ChoiceRow {
+    pub model: String,
+    pub chosen: bool,
+    pub cells: Vec<String>,
+    /// Length of the bar of its held-out error, per cent of the worst.
+    pub bar: f64,
+}
+
+pub(super) struct Fits {
+    pub labels: Vec<String>,
+    pub has_truth: bool,
+    pub rows: Vec<Row>,
+    pub merits: Vec<Merit>,
+    pub correlations: Vec<Correlations>,
+    pub choices: Vec<Choice>,
+}
+
+pub(super) fn fits(run: &Run) -> Fits {
+    Fits {
+        labels: run.fits.iter().map(|f| f.label.clone()).collect(),
+        has_truth: run.truth.is_some(),
+        rows: rows(run),
+        merits: merits(run),
+        correlations: run.fits.iter().filter_map(correlations).collect(),
+        choices: run.fits.iter().filter_map(choice).collect(),
+    }
+}
+
+/// Every parameter of any fit, in the order of the richest.
+fn rows(run: &Run) -> Vec<Row> {
+    let mut names: Vec<(String, &'static str)> = Vec::new();
+    let truth = run.truth.as_ref().map(|t| parameters(t.material()));
+    let of_fits: Vec<Vec<Parameter>> = run.fits.iter().map(|f| parameters(f.material())).collect();
+    let mut all: Vec<&Vec<Parameter>> = truth.iter().chain(&of_fits).collect();
+    all.sort_by_key(|list| std::cmp::Reverse(list.len()));
+    for parameter in all.into_iter().flatten() {
+        if !names.iter().any(|(name, _)| *name == parameter.name) {
+            names.push((parameter.name.clone(), parameter.unit));
+        }
+    }
+    let find = |list: &[Parameter], name: &str| list.iter().find(|p| p.name == name).cloned();
+    let row = |(name, unit): (String, &'static str)| {
+        let true_value = truth.as_ref().and_then(|t| find(t, &name)).map(|p| p.value);
+        let cells = of_fits.iter().map(|list| find(list, &name).map(|p| p.cell(true_value))).collect();
+        Row { truth: true_value.map(number), name, unit, cells }
+    };
+    names.into_iter().map(row).collect()
+}
+
+#[derive(Clone)]
+struct Parameter {
+    name: String,
+    unit: &'static str,
+    value: f64,
+    error: Option<f64>,
+    interval: Option<(f64, f64)>,
+    undetermined: bool,
+    fitted: bool,
+}
+
+impl Parameter {
+    fn cell(&self, truth: Option<f64>) -> Cell {
+        let (value, error) = match self.error.filter(|e| *e > 0.0) {
+            Some(error) => {
+                let (value, error) = to_error(self.value, error);
+                (value, Some(error))
+            }
+            None => (number(self.value), None),
+        };
+        let note = match (self.interval, self.error) {
+            _ if self.undetermined => "the data do not determine it".into(),
+            (Some((low, high)), _) if low == high => "held".into(),
+            (Some((low, high)), _) => format!("95 %: {} to {}", number_like(low, &value), number_like(high, &value)),
+            (None, None) if self.fitted => "at the end of its range".into(),
+            _ => String::new(),
+        };
+        let off = truth.zip(self.error.filter(|e| *e > 0.0)).map(|(truth, error)| {
+            let z = (self.value - truth) / error;
+            crate::report::plot::minus(&format!("{z:+.1} σ from truth"))
+        });
+        Cell { value, error, note, off }
+    }
+}
+
+/// As many decimals as another number has.
+fn number_like(x: f64, other: &str) -> String {
+    let places = other.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    if other.contains('·') { number(x) } else { crate::report::plot::minus(&format!("{x:.places$}")) }
+}
+
+/// A material's parameters by name, with what its record says of them.
+fn parameters(material: &Material) -> Vec<Parameter> {
+    let empty = FitRecord::default();
+    let record = material.fit.as_ref().unwrap_or(&empty);
+    let mut list = Vec::new();
+    for (l, lobe) in material.lobes.iter().enumerate() {
+        let name = material.lobe_name(l);
+        let (errors, intervals) = (record.standard_error.get(l), record.interval_95.get(l));
+        let mut push = |name: String, unit, value, error: Option<f64>, interval| {
+            let undetermined = record.undetermined.contains(&name);
+            list.push(Parameter { name, unit, value, error, interval, undetermined, fitted: material.fit.is_some() });
+        };
+        for (c, weight) in lobe.weight.iter().enumerate() {
+            let error = errors.and_then(|r| r.weight.get(c).copied().flatten());
+            let interval = intervals.and_then(|r| r.weight.get(c).copied().flatten());
+            push(format!("{name}.weight[{}]", material.channels[c]), "1", *weight, error, interval);
+        }
+        for (i, known) in lobe.kind.lobe().parameters().iter().enumerate() {
+            let Some(shape) = lobe.shape.as_ref().and_then(|s| s.get(i)) else { continue };
+            let at = |c: usize| errors.and_then(|r| r.shape.get(i)).and_then(|(_, e)| e.get(c)).flatten();
+            let within = |c: usize| intervals.and_then(|r| r.shape.get(i)).and_then(|(_, e)| e.get(c)).flatten();
+            let label = format!("{name}.{}", known.name);
+            match shape {
+                PerChannel::Shared(value) => push(label, known.unit, *value, at(0), within(0)),
+                PerChannel::Each(values) => {
+                    for (c, value) in values.iter().enumerate() {
+                        push(format!("{label}[{}]", material.channels[c]), known.unit, *value, at(c), within(c));
+                    }
+                }
+            }
+        }
+    }
+    list
+}
+
+/// The unit of a fit's residuals, with a space before it.
+pub(super) fn unit_of(fit: &RunFit, record: &FitRecord) -> String {
+    let flat = fit.material().lobes.iter().any(|l| matches!(l.kind, LobeKind::Lambert2d | LobeKind::Phong2d));
+    let dimension = if flat { Dimension::Flat } else { Dimension::Space };
+    let unit = Loss::from_name(&record.loss).map_or("", |loss| loss.unit(dimension));
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+/// What of a record stands in a line of the table.
+type Said = fn(&RunFit, &FitRecord) -> String;
+
+fn merits(run: &Run) -> Vec<Merit> {
+    let lines: [(&'static str, Said); 12] = [
+        ("Status", |_, r| r.status.clone()),
+        ("Loss", |_, r| r.robust.as_ref().map_or_else(|| r.loss.clone(), |robust| format!("{}, {robust}", r.loss))),
+        ("Weights", |_, r| r.weights.clone()),
+        ("Seen through", |_, r| r.through.clone().unwrap_or_else(|| "–".into())),
+        ("Samples", |_, r| match &r.subset {
+            Some(s) => format!("{} of {}", count(s.samples), count(s.of)),
+            None => count(r.samples),
+        }),
+        ("rmse", |f, r| format!("{}{}", number(r.rmse), unit_of(f, r))),
+        ("of it noise", |f, r| {
+            r.residual.as_ref().map_or("–".into(), |x| format!("{}{}", number(x.noise_rmse), unit_of(f, r)))
+        }),
+        ("of it the model's own error", |f, r| {
+            r.residual.as_ref().map_or("–".into(), |x| format!("{}{}", number(x.model_rmse), unit_of(f, r)))
+        }),
+        ("worth so many independent values", |_, r| {
+            r.residual.as_ref().map_or("–".into(), |x| count(x.effective_samples.round().max(0.0) as u64))
+        }),
+        ("Largest directional albedo", |_, r| r.energy.as_ref().map_or("–".into(), |e| percent(e.largest))),
+        ("Starts that reached the minimum", |_, r| {
+            r.search.as_ref().map_or("–".into(), |s| format!("{} of {}", s.reached, s.starts))
+        }),
+        ("Time", |_, r| time(r.seconds)),
+    ];
+    let empty = FitRecord::default();
+    let of =
+        |say: Said| run.fits.iter().map(|f| say(f, f.material().fit.as_ref().unwrap_or(&empty))).collect::<Vec<_>>();
+    let all = lines.into_iter().map(|(name, say)| Merit { name, cells: of(say) });
+    all.filter(|m| m.cells.iter().any(|c| c != "–")).collect()
+}
+
+fn correlations(fit: &RunFit) -> Option<Correlations> {
+    let c = fit.material().fit.as_ref()?.correlation.as_ref()?;
+    let mut strongest: Option<(f64, usize, usize)> = None;
+    for i in 0..c.parameters.len() {
+        for j in 0..i {
+            let Some(r) = c.matrix[i][j] else { continue };
+            if strongest.is_none_or(|(most, ..)| r.abs() > most.abs()) {
+                strongest = Some((r, i, j));
+            }
+        }
+    }
+    let (r, i, j) = strongest?;
+    let row = |(name, values): (&String, &Vec<Option<f64>>)| (name.clone(), values.iter().map(|v| shade(*v)).collect());
+    Some(Correlations {
+        label: fit.label.clone(),
+        names: c.parameters.clone(),
+        rows: c.parameters.iter().zip(&c.matrix).map(row).collect(),
+        strongest: format!(
+            "strongest: {} and {}, {}",
+            c.parameters[i],
+            c.parameters[j],
+            crate::report::plot::minus(&format!("{r:+.2}"))
+        ),
+    })
+}
+
+/// A coefficient in its colour, the text black or white as it reads better.
+fn shade(value: Option<f64>) -> Shade {
+    let Some(value) = value else { return Shade { text: "–".into(), style: String::new() } };
+    let color = ColorMap::Diverging.color(0.5 + 0.5 * value);
+    let [r, g, b] = color.map(|c| (f64::from(c) / 255.0).powf(2.2));
+    let ink = if 0.2126 * r + 0.7152 * g + 0.0722 * b > 0.18 { "#111" } else { "#fff" };
+    let text = if value == 1.0 { "1".into() } else { crate::report::plot::minus(&format!("{value:.2}")) };
+    Shade { text, style: format!("background:{};color:{ink}", hex(color)) }
+}
+
+fn choice(fit: &RunFit) -> Option<Choice> {
+    let choice = fit.material().fit.as_ref()?.choice.as_ref()?;
+    let worst = choice.candidates.iter().map(|c| c.held_out_rmse).fold(0.0, f64::max);
+    let row = |c: &crate::brdf::ModelCandidate| ChoiceRow {
+        model: c.model.clone(),
+        chosen: c.model == choice.chosen,
+        cells: vec![count(c.parameters), number(c.rmse), number(c.held_out_rmse), number(c.aicc), number(c.bic)],
+        bar: (100.0 * c.held_out_rmse / worst).clamp(0.5, 100.0),
+    };
+    Some(Choice {
+        label: fit.label.clone(),
+        reason: choice.reason.clone(),
+        rows: choice.candidates.iter().map(row).collect(),
+    })
+}
