@@ -44,21 +44,21 @@ fn raised(c: char) -> char {
 /// A share in per cent.
 pub(in crate::report) fn percent(share: f64) -> String {
     match share {
-        0.0 => "0 %".into(),
-        s if s < 1e-3 => format!("{} %", digits(100.0 * s, 2)),
-        s if s > 0.9995 && s < 1.0 => format!("{} %", digits(100.0 * s, 5)),
-        s => format!("{} %", digits(100.0 * s, 3)),
+        0.0 => "0\u{a0}%".into(),
+        s if s < 1e-3 => format!("{}\u{a0}%", digits(100.0 * s, 2)),
+        s if s > 0.9995 && s < 1.0 => format!("{}\u{a0}%", digits(100.0 * s, 5)),
+        s => format!("{}\u{a0}%", digits(100.0 * s, 3)),
     }
 }
 
 /// A time.
 pub(in crate::report) fn time(seconds: f64) -> String {
     match seconds {
-        s if s < 1e-3 => format!("{} µs", digits(s * 1e6, 2)),
-        s if s < 1.0 => format!("{} ms", digits(s * 1e3, 3)),
-        s if s < 120.0 => format!("{} s", digits(s, 3)),
-        s if s < 7200.0 => format!("{} min", digits(s / 60.0, 3)),
-        s => format!("{} h", digits(s / 3600.0, 3)),
+        s if s < 1e-3 => format!("{}\u{a0}µs", digits(s * 1e6, 2)),
+        s if s < 1.0 => format!("{}\u{a0}ms", digits(s * 1e3, 3)),
+        s if s < 120.0 => format!("{}\u{a0}s", digits(s, 3)),
+        s if s < 7200.0 => format!("{}\u{a0}min", digits(s / 60.0, 3)),
+        s => format!("{}\u{a0}h", digits(s / 3600.0, 3)),
     }
 }
 
@@ -99,9 +99,9 @@ mod tests {
         assert_eq!([number(7.374e-4), number(f64::NAN), number(2e7)], ["7.374·10⁻⁴", "–", "2.000·10⁷"]);
         assert_eq!(
             [percent(0.1874), percent(0.99998), percent(2e-5), percent(1.0)],
-            ["18.7 %", "99.998 %", "0.002 %", "100 %"]
+            ["18.7\u{a0}%", "99.998\u{a0}%", "0.002\u{a0}%", "100\u{a0}%"]
         );
-        assert_eq!([time(0.0093), time(3.2), time(2e-5)], ["9.3 ms", "3.2 s", "20 µs"]);
+        assert_eq!([time(0.0093), time(3.2), time(2e-5)], ["9.3\u{a0}ms", "3.2\u{a0}s", "20\u{a0}µs"]);
         assert_eq!([count(5), count(22050), count(1458000)], ["5", "22\u{202f}050", "1\u{202f}458\u{202f}000"]);
         assert_eq!(to_error(0.320032, 0.000049), ("0.320032".into(), "0.000049".into()));
         assert_eq!(to_error(90.0163, 0.0192), ("90.016".into(), "0.019".into()));

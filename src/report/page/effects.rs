@@ -2,10 +2,12 @@
 
 use serde_json::Value;
 
+use super::reproduce::typed;
 use crate::chain::{Stage, scene_plan};
 use crate::control::Plan;
-use crate::gonio::{self, Instrument};
-use crate::report::run::{Kind, Run};
+use crate::gonio;
+use crate::report::run::{Kind, Run, RunFit};
+use crate::report::views::Predicted;
 use crate::report::words::percent;
 
 pub(super) struct Effect {
@@ -19,7 +21,10 @@ pub(super) struct Effect {
 
 pub(super) struct Listed {
     pub title: String,
-    pub effects: Vec<Effect>,
+    pub on: Vec<Effect>,
+    pub off: Vec<Effect>,
+    /// Names of what is off.
+    pub names_off: String,
     /// Whether shares and errors are known.
     pub measured: bool,
     pub command: String,
@@ -52,40 +57,37 @@ fn instrument(run: &Run) -> Option<Listed> {
     let name = run.instrument.as_deref()?;
     let truth = run.truth.as_ref()?.material();
     let known = crate::report::run::instrument(name, run.made.folder.as_deref());
-    let (instrument, typed) = match known {
-        Some(instrument) => (instrument, format!(" --instrument {name}")),
-        None => (Instrument::default(), String::new()),
-    };
-    Some(Listed {
-        title: format!("Of the instrument: {name}"),
-        effects: plain(gonio::plan(&instrument, &truth.channels)),
-        measured: false,
-        command: format!("goniofit effects --material {}{typed}", run.title),
-    })
+    let mut words = vec!["goniofit", "effects", "--material", &run.title];
+    if known.is_some() {
+        words.extend(["--instrument", name]);
+    }
+    let effects = plain(gonio::plan(&known.unwrap_or_default(), &truth.channels));
+    Some(Listed::new(format!("The instrument, {name}"), effects, false, typed(&words)))
 }
 
 /// Of the scene, with what `effects.json` says of it.
 fn scene(run: &Run) -> Option<Listed> {
     let name = run.scene.as_deref()?;
-    let measured = run.effects.as_ref().filter(|e| e["scene"] == name);
-    let effects = match measured {
+    let found = run.effects.as_ref().filter(|e| e["scene"] == name);
+    let effects = match found {
         Some(found) => found["effects"].as_array()?.iter().map(told).collect(),
         None => {
-            let fit = run
-                .fits
-                .last()
-                .map(crate::report::run::RunFit::material)
-                .or(run.truth.as_ref().map(|t| t.material()))?;
-            plain(scene_plan(&Stage::built_in(name).ok()?, fit).ok()?)
+            let truth = run.truth.as_ref().map(Predicted::material);
+            let material = run.fits.last().map(RunFit::material).or(truth)?;
+            plain(scene_plan(&Stage::built_in(name).ok()?, material).ok()?)
         }
     };
-    let folder = run.folder.display();
-    Some(Listed {
-        title: format!("Of the scene: {name}"),
-        effects,
-        measured: measured.is_some(),
-        command: format!("goniofit effects --scene {name} --json > {folder}/effects.json"),
-    })
+    let out = run.folder.join("effects.json").display().to_string();
+    let command = format!("{} > {}", typed(&["goniofit", "effects", "--scene", name, "--json"]), typed(&[&out]));
+    Some(Listed::new(format!("The scene, {name}"), effects, found.is_some(), command))
+}
+
+impl Listed {
+    fn new(title: String, effects: Vec<Effect>, measured: bool, command: String) -> Self {
+        let (on, off): (Vec<Effect>, Vec<Effect>) = effects.into_iter().partition(|e| e.on);
+        let names_off = off.iter().map(|e| e.name.as_str()).collect::<Vec<_>>().join(", ");
+        Self { title, on, off, names_off, measured, command }
+    }
 }
 
 fn told(effect: &Value) -> Effect {

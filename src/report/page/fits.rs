@@ -132,7 +132,8 @@ impl Parameter {
         };
         let off = truth.zip(self.error.filter(|e| *e > 0.0)).map(|(truth, error)| {
             let z = (self.value - truth) / error;
-            crate::report::plot::minus(&format!("{z:+.1} σ from truth"))
+            let z = if z.abs() < 100.0 { format!("{z:+.1}") } else { format!("{z:+.0}") };
+            crate::report::plot::minus(&format!("{z} σ from truth"))
         });
         Cell { value, error, note, off }
     }
@@ -179,12 +180,19 @@ fn parameters(material: &Material) -> Vec<Parameter> {
     list
 }
 
-/// The unit of a fit's residuals, with a space before it.
-pub(super) fn unit_of(fit: &RunFit, record: &FitRecord) -> String {
+/// The unit of a fit's residuals; empty where they have none.
+pub(super) fn unit_of(fit: &RunFit, record: &FitRecord) -> &'static str {
     let flat = fit.material().lobes.iter().any(|l| matches!(l.kind, LobeKind::Lambert2d | LobeKind::Phong2d));
     let dimension = if flat { Dimension::Flat } else { Dimension::Space };
-    let unit = Loss::from_name(&record.loss).map_or("", |loss| loss.unit(dimension));
-    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+    Loss::from_name(&record.loss).map_or("", |loss| loss.unit(dimension))
+}
+
+/// A residual's size with its unit.
+fn with_unit(x: f64, fit: &RunFit, record: &FitRecord) -> String {
+    match unit_of(fit, record) {
+        "" => number(x),
+        unit => format!("{} {unit}", number(x)),
+    }
 }
 
 /// What of a record stands in a line of the table.
@@ -200,12 +208,12 @@ fn merits(run: &Run) -> Vec<Merit> {
             Some(s) => format!("{} of {}", count(s.samples), count(s.of)),
             None => count(r.samples),
         }),
-        ("rmse", |f, r| format!("{}{}", number(r.rmse), unit_of(f, r))),
+        ("rmse", |f, r| with_unit(r.rmse, f, r)),
         ("of it noise", |f, r| {
-            r.residual.as_ref().map_or("–".into(), |x| format!("{}{}", number(x.noise_rmse), unit_of(f, r)))
+            r.residual.as_ref().map_or("–".into(), |x| with_unit(x.noise_rmse, f, r))
         }),
         ("of it the model's own error", |f, r| {
-            r.residual.as_ref().map_or("–".into(), |x| format!("{}{}", number(x.model_rmse), unit_of(f, r)))
+            r.residual.as_ref().map_or("–".into(), |x| with_unit(x.model_rmse, f, r))
         }),
         ("worth so many independent values", |_, r| {
             r.residual.as_ref().map_or("–".into(), |x| count(x.effective_samples.round().max(0.0) as u64))

@@ -50,7 +50,7 @@ pub(super) fn measured(run: &Run) -> Option<Measured> {
         );
         (coverage_figure(c, &own, false).inline(), said)
     });
-    let masked = cover.as_ref().filter(|c| c.masked > 0.0).map(|c| masked_figure(c, false).inline());
+    let masked = cover.as_ref().filter(|c| c.masked > 5e-4).map(|c| masked_figure(c, false).inline());
     let channel = default_channel(&table.measurement.channels);
     let row = |r: &crate::chain::Scatter| ScatterRow {
         theta: number(r.theta_i_deg),
@@ -117,6 +117,9 @@ fn facts(run: &Run) -> Vec<Fact> {
         },
     );
     fact("Weights", s.weights.into());
+    if let Ok(brdf) = &table.brdf {
+        brdf.notes().iter().for_each(|note| fact("As a BRDF", note.clone()));
+    }
     facts
 }
 

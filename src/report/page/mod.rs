@@ -98,10 +98,9 @@ pub fn page(run: &Run) -> Result<Written, ReportError> {
 fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
     let mut missing = Missing::default();
     if let Err(reason) = &run.table {
-        missing.measured = format!(
-            "The measurement is not at hand: {reason}. Name it: goniofit report {} --measurement FILE",
-            run.folder.display()
-        );
+        let folder = run.folder.display().to_string();
+        let command = reproduce::typed(&["goniofit", "report", &folder, "--measurement", "FILE"]);
+        missing.measured = format!("The measurement is not at hand: {reason}. Name it: {command}");
         missing.residuals = "Residuals need the measurement and a fit of it.".into();
     }
     if run.fits.is_empty() {
@@ -112,12 +111,18 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
         missing.lobes = "Neither readings in a plane of incidence nor a fit to draw lobes of.".into();
     }
     if !has_pictures {
-        let of = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
-        let fits: Vec<&str> = run.fits.iter().map(|f| f.file.as_str()).collect();
-        let fits = if fits.is_empty() { "FIT.json".into() } else { fits.join(" ") };
-        missing.pictures = format!(
-            "There are no pictures here. Render table and fits under the same light: goniofit validate {of} {fits} --out DIR --report"
-        );
+        let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
+        let mut words = vec!["goniofit", "validate", &table];
+        words.extend(run.fits.iter().map(|f| f.file.as_str()));
+        words.extend(["--out", "DIR", "--report"]);
+        let command = reproduce::typed(&words);
+        missing.pictures = format!("There are no pictures here. Render table and fits under the same light: {command}");
+    }
+    if run.sweeps.is_empty() {
+        let folder = run.folder.join("tradeoff").display().to_string();
+        let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
+        let command = reproduce::typed(&["goniofit", "tradeoff", "fit", &table, "--out", &folder]);
+        missing.tradeoff = format!("How much accuracy another second buys is not measured here: {command}");
     }
     missing
 }

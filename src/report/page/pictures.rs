@@ -92,6 +92,17 @@ pub(super) fn pictures(run: &Run) -> Result<Option<Pictures>, ReportError> {
     }))
 }
 
+/// About how wide the picture beside the title is, pixels.
+const COVER: usize = 220;
+
+/// The first picture, small, with its alternative text.
+pub(super) fn cover(run: &Run) -> Option<(String, String)> {
+    let first = run.pictures.first()?;
+    let image = reduced(&first.image, (first.image.width / COVER).max(1));
+    let exposure = run.exposure.unwrap_or_else(|| exposure_for(&first.image));
+    Some((png(&develop(&image, exposure)).ok()?, format!("{}, rendered", first.label)))
+}
+
 /// By how much pictures are made smaller so that all fit.
 fn factor(pixels: usize) -> usize {
     (1..).find(|f| pixels / (f * f) <= MOST_PIXELS).unwrap_or(1)

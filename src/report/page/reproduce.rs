@@ -32,11 +32,11 @@ pub(super) fn reproduce(run: &Run) -> Reproduce {
 }
 
 /// Words as they are typed in a shell.
-pub(super) fn typed(words: &[String]) -> String {
+pub(super) fn typed<S: AsRef<str>>(words: &[S]) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+%@".contains(c);
-    let quoted = |word: &String| match word.is_empty() || !word.chars().all(plain) {
-        true => format!("'{}'", word.replace('\'', r"'\''")),
-        false => word.clone(),
+    let quoted = |word: &S| match word.as_ref() {
+        word if !word.is_empty() && word.chars().all(plain) => word.to_owned(),
+        word => format!("'{}'", word.replace('\'', r"'\''")),
     };
     words.iter().map(quoted).collect::<Vec<_>>().join(" ")
 }
@@ -44,8 +44,7 @@ pub(super) fn typed(words: &[String]) -> String {
 fn commands(run: &Run) -> Vec<Command> {
     let mut list = Vec::new();
     let mut push = |makes: &str, words: &[&str]| {
-        let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
-        list.push(Command { makes: makes.into(), typed: typed(&words) });
+        list.push(Command { makes: makes.into(), typed: typed(words) });
     };
     let path = run.table.as_ref().ok().map(|t| t.path.display().to_string());
     let files: Vec<&str> = run.fits.iter().map(|f| f.file.as_str()).collect();
@@ -77,7 +76,7 @@ mod tests {
 
     #[test]
     fn words_are_quoted_where_a_shell_would_split_them() {
-        let words = ["goniofit", "fit", "my lab.csv", "it's", "a+b.json"].map(str::to_owned);
+        let words = ["goniofit", "fit", "my lab.csv", "it's", "a+b.json"];
         assert_eq!(typed(&words), r"goniofit fit 'my lab.csv' 'it'\''s' a+b.json");
     }
 }

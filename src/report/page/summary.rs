@@ -7,6 +7,7 @@ use crate::report::words::{count, number, percent, time};
 pub(super) struct Card {
     pub label: String,
     pub value: String,
+    pub unit: &'static str,
     pub note: String,
 }
 
@@ -23,10 +24,12 @@ pub(super) struct Summary {
     pub verdict: Vec<String>,
     pub cards: Vec<Card>,
     pub warnings: Vec<Warning>,
+    /// A small picture with its alternative text.
+    pub picture: Option<(String, String)>,
 }
 
 pub(super) fn summary(run: &Run) -> Summary {
-    Summary { subtitle: subtitle(run), verdict: verdict(run), cards: cards(run), warnings: warnings(run) }
+    Summary { picture: super::pictures::cover(run), subtitle: subtitle(run), verdict: verdict(run), cards: cards(run), warnings: warnings(run) }
 }
 
 fn subtitle(run: &Run) -> String {
@@ -84,49 +87,43 @@ fn verdict(run: &Run) -> Vec<String> {
 
 fn cards(run: &Run) -> Vec<Card> {
     let mut cards = Vec::new();
-    let mut card = |label: &str, value: String, note: String| {
-        cards.push(Card { label: label.into(), value, note });
+    let mut card = |label: &str, value: String, unit: &'static str, note: String| {
+        cards.push(Card { label: label.into(), value, unit, note });
     };
     if let Ok(table) = &run.table {
         let s = &table.summary;
-        card("direction pairs", count(s.entries as u64), format!("{} of the values valid", percent(s.valid_share)));
+        let note = format!("{} of the values valid", percent(s.valid_share));
+        card("direction pairs", count(s.entries as u64), "", note);
     }
     if let Some(fit) = best(run)
         && let Some(record) = &fit.material().fit
     {
-        let unit = if record.loss == "log" || record.loss == "relative" { "" } else { " 1/sr" };
-        card(
-            "rmse of the best fit",
-            format!("{}{unit}", number(record.rmse)),
-            format!("{}, {}", fit.label, record.status),
-        );
+        let note = format!("{}, {}", fit.label, record.status);
+        card("rmse of the best fit", number(record.rmse), super::fits::unit_of(fit, record), note);
         let looks = fit.image.as_ref().and_then(|i| i["appearance"]["flip"]["mean"].as_f64());
         if let Some(flip) = looks {
-            card("ꟻLIP of its picture", number(flip), "0: looks the same, 1: as different as can be".into());
+            card("ꟻLIP of its picture", number(flip), "", "0: looks the same, 1: as different as can be".into());
         }
         if let Some(energy) = &record.energy {
             let note = if energy.conserved { "energy is conserved" } else { "more than comes in" };
-            card("reflects at most", percent(energy.largest), note.into());
+            card("reflects at most", percent(energy.largest), "", note.into());
         }
     }
-    let seconds: f64 = run.times.iter().map(|(_, s)| s).sum();
     if run.kind == Kind::Demo {
-        card("the whole chain took", time(seconds), "measure, fit, render, compare".into());
+        let seconds: f64 = run.times.iter().map(|(_, s)| s).sum();
+        card("the whole chain took", time(seconds), "", "measure, fit, render, compare".into());
     }
     cards
 }
 
 fn warnings(run: &Run) -> Vec<Warning> {
     let mut all = Vec::new();
-    let mut push = |of: &str, text: &str| all.push(Warning { of: of.into(), text: text.into() });
+    let mut push = |of: &str, text: &str| all.push(Warning { of: of.into(), text: text.replace('`', "") });
     for note in &run.notes {
         push("run", note);
     }
     if let Ok(table) = &run.table {
         table.measurement.notes.iter().for_each(|note| push("measurement", note));
-        if let Ok(brdf) = &table.brdf {
-            brdf.notes().iter().for_each(|note| push("measurement", note));
-        }
         if table.summary.masked.total() > 0 {
             let masked = &table.summary.masked;
             push(

@@ -100,7 +100,7 @@ impl Default for Chart {
             series: Vec::new(),
             bars: true,
             legend: LegendPlace::Below,
-            size: (480.0, 330.0),
+            size: (450.0, 330.0),
         }
     }
 }
@@ -138,7 +138,7 @@ impl Chart {
             canvas.text("head", (10.0, 20.0), &self.title);
         }
         let axis = |label, scale, labels| Axis { label, scale, labels };
-        let across = (area.width / 62.0) as usize;
+        let across = (area.width / 64.0) as usize;
         area.frame(&mut canvas, &axis(&self.x_label, self.x, across), &axis(&self.y_label, self.y, 6), true);
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, &area, s)));
         draw_legend(&mut canvas, &rows, 10.0, height + 8.0);
@@ -237,7 +237,7 @@ pub(in crate::report) type Entry<'a> = (f64, &'a str, Marks, usize);
 pub(in crate::report) fn legend_rows<'a>(names: &[(&'a str, Marks, usize)], width: f64) -> Vec<Vec<Entry<'a>>> {
     let (mut rows, mut x) = (vec![Vec::new()], 0.0);
     for &(name, marks, color) in names.iter().filter(|(name, ..)| !name.is_empty()) {
-        let needed = 30.0 + text_width(name, 12.0) + 18.0;
+        let needed = 30.0 + text_width(name, 13.0) + 18.0;
         if x > 0.0 && x + needed > width {
             rows.push(Vec::new());
             x = 0.0;

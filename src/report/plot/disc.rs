@@ -57,7 +57,7 @@ impl Disc {
         frame(&mut canvas, center, radius);
         for theta in &self.incidences_deg {
             let r = radius * projected(*theta);
-            canvas.circle("head-of-ray", (center.0 - r, center.1), 2.4);
+            canvas.circle("incidence", (center.0 - r, center.1), 2.8);
         }
         let bar = (center.0 + radius + 30.0, top, 2.0 * radius);
         color_bar(&mut canvas, ColorMap::Sequential, self.scale, &self.color_label, bar);
@@ -81,7 +81,7 @@ fn frame(canvas: &mut Canvas, center: (f64, f64), radius: f64) {
             let r = radius * projected(theta);
             c.path("zero", ring(center, r));
             let along = r * FRAC_1_SQRT_2;
-            c.text("tick", (center.0 + along + 2.0, center.1 + along + 10.0), &format!("{theta}°"));
+            c.text("tick halo", (center.0 + along + 2.0, center.1 + along + 10.0), &format!("{theta}°"));
         }
         c.path("axis", ring(center, radius));
         for (x, y, class, text) in [

@@ -106,6 +106,8 @@ pub struct Run {
     pub notes: Vec<String>,
     /// What `goniofit effects --json` found, where its output lies in the folder as `effects.json`.
     pub effects: Option<Value>,
+    /// What `goniofit tradeoff` measured: every `tradeoff.json` in the folder, or in a folder within it.
+    pub sweeps: Vec<Value>,
 }
 
 /// What `numbers.json` does not say.
@@ -143,6 +145,7 @@ impl Run {
         if effects.is_file() {
             run.effects = Some(json(&effects)?);
         }
+        run.sweeps = sweeps(folder)?.iter().map(|path| json(path)).collect::<Result<_, _>>()?;
         Ok(run)
     }
 
@@ -186,6 +189,7 @@ impl Run {
             made: Made::default(),
             notes: Vec::new(),
             effects: None,
+            sweeps: Vec::new(),
         }
     }
 }
@@ -229,6 +233,16 @@ fn picture(folder: &Path, file: &str, label: &str) -> Result<Option<Picture>, Re
     }
     let image = crate::image::read_exr(&path).map_err(crate::chain::ChainError::from)?;
     Ok(Some(Picture { label: label.into(), file: file.into(), image }))
+}
+
+/// Where sweeps lie, by name.
+fn sweeps(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
+    const NAME: &str = "tradeoff.json";
+    let entries = std::fs::read_dir(folder).map_err(|source| ReportError::Io { path: folder.into(), source })?;
+    let within = entries.filter_map(Result::ok).map(|e| e.path().join(NAME));
+    let mut found: Vec<PathBuf> = within.chain([folder.join(NAME)]).filter(|p| p.is_file()).collect();
+    found.sort();
+    Ok(found)
 }
 
 /// The note on a run that was ended early.

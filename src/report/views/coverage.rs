@@ -164,7 +164,7 @@ pub fn coverage_figure(coverage: &Coverage, incidences_deg: &[f64], titled: bool
         titled,
         cells: cells.map(cell).collect(),
         scale: Scale { low: least, high: most, spacing: Spacing::Log },
-        color_label: "values in a cell".into(),
+        color_label: "values".into(),
         incidences_deg: incidences_deg.to_vec(),
         width: 420.0,
     };
