@@ -44,8 +44,11 @@ fn a_slice_holds_the_readings_and_the_fit() {
         angle(row, "theta_i_deg") == 30.0 && angle(row, "theta_o_deg") == 30.0 && (turned - 180.0).abs() < 1e-6
     });
     let mirror: f64 = mirror.expect("a reading")[column("r")].parse().unwrap();
-    let angles = |curve: &serde_json::Value| -> Vec<f64> { curve["theta_o_deg"].as_array().unwrap().iter().map(number).collect() };
-    let at = |curve: &serde_json::Value, theta: f64| angles(curve).iter().position(|t| (t - theta).abs() < 1e-6).unwrap();
+    let angles = |curve: &serde_json::Value| -> Vec<f64> {
+        curve["theta_o_deg"].as_array().unwrap().iter().map(number).collect()
+    };
+    let at =
+        |curve: &serde_json::Value, theta: f64| angles(curve).iter().position(|t| (t - theta).abs() < 1e-6).unwrap();
     assert_eq!(number(&readings["value"][at(readings, 30.0)]), mirror);
     // The fit's own value there: kd/π + ks (n + 2)/2π.
     let lobes = &b.json_file("p.json")["lobes"];

@@ -18,7 +18,9 @@ fn the_demo_and_report_write_the_same_page() {
     assert_eq!(said["report"], "d/report.html");
     let page = b.text("d/report.html");
     assert_whole(&page);
-    for part in ["glossy-paint", "lambert+phong", "goniofit demo --size 24 --samples 4 --out d --report", "goniofit plot"] {
+    for part in
+        ["glossy-paint", "lambert+phong", "goniofit demo --size 24 --samples 4 --out d --report", "goniofit plot"]
+    {
         assert!(page.contains(part), "{part}");
     }
     let told = b.json(&["report", "d", "--out", "again.html"]);

@@ -133,12 +133,30 @@ fn all_controls_are_reached_and_worked_by_keyboard() {
     page.wait_for("document.querySelector('#viewer').dataset.ready === 'true'");
     let mut reached = Vec::new();
     for _ in 0..80 {
-        page.call("Input.dispatchKeyEvent", serde_json::json!({ "type": "keyDown", "key": "Tab", "code": "Tab", "windowsVirtualKeyCode": 9 }));
-        page.call("Input.dispatchKeyEvent", serde_json::json!({ "type": "keyUp", "key": "Tab", "code": "Tab", "windowsVirtualKeyCode": 9 }));
+        page.call(
+            "Input.dispatchKeyEvent",
+            serde_json::json!({ "type": "keyDown", "key": "Tab", "code": "Tab", "windowsVirtualKeyCode": 9 }),
+        );
+        page.call(
+            "Input.dispatchKeyEvent",
+            serde_json::json!({ "type": "keyUp", "key": "Tab", "code": "Tab", "windowsVirtualKeyCode": 9 }),
+        );
         let at = page.eval("(() => { const e = document.activeElement; return e.name || e.id || e.tagName; })()");
         reached.push(at.as_str().unwrap_or_default().to_owned());
     }
-    for control in ["theme", "incidence", "channel", "scale", "lobe-frames", "statistic", "picture", "view", "exposure", "stage", "split"] {
+    for control in [
+        "theme",
+        "incidence",
+        "channel",
+        "scale",
+        "lobe-frames",
+        "statistic",
+        "picture",
+        "view",
+        "exposure",
+        "stage",
+        "split",
+    ] {
         assert!(reached.iter().any(|r| r == control), "{control} is not reached: {reached:?}");
     }
 }

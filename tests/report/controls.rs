@@ -33,15 +33,26 @@ fn value_at(curve: &Value, theta: f64) -> f64 {
 
 #[test]
 fn lobes_show_the_readings_and_fits_of_the_incidence_that_is_chosen() {
-    let Some(mut page) = page_or_skip("lobes_show_the_readings_and_fits_of_the_incidence_that_is_chosen") else { return };
+    let Some(mut page) = page_or_skip("lobes_show_the_readings_and_fits_of_the_incidence_that_is_chosen") else {
+        return;
+    };
     open(&mut page);
     let run = Run::shared();
     let incidences = page.eval("JSON.parse(document.querySelector('#data').textContent).lobes.incidences");
     for (k, channel) in [(0, "r"), (3, "g"), (5, "b")] {
         let theta = incidences[k].as_f64().unwrap();
         let plotted = run.json(&[
-            "plot", "slice", "demo/measurement.csv", "demo/lambert.json", "demo/lambert+phong.json",
-            "--incidence", &theta.to_string(), "--channel", channel, "--out", "slice.svg",
+            "plot",
+            "slice",
+            "demo/measurement.csv",
+            "demo/lambert.json",
+            "demo/lambert+phong.json",
+            "--incidence",
+            &theta.to_string(),
+            "--channel",
+            channel,
+            "--out",
+            "slice.svg",
         ]);
         let curves = &plotted["slices"][0]["curves"];
         click(&mut page, "incidence", &k.to_string());
@@ -100,12 +111,13 @@ fn curves_stand_where_their_values_are_on_both_scales() {
 fn residual_maps_tell_the_cells_that_the_plot_command_tells() {
     let Some(mut page) = page_or_skip("residual_maps_tell_the_cells_that_the_plot_command_tells") else { return };
     open(&mut page);
-    let plotted = Run::shared().json(&["plot", "residuals", "demo/measurement.csv", "demo/lambert.json", "--out", "r.svg"]);
+    let plotted =
+        Run::shared().json(&["plot", "residuals", "demo/measurement.csv", "demo/lambert.json", "--out", "r.svg"]);
     let map = &plotted["maps"][1];
     click(&mut page, "statistic", "rms");
-    assert_eq!(page.eval("[...document.querySelectorAll('[data-rms]')].filter((f) => !f.hidden).every((f) => f.dataset.rms === 'true')"), true);
+    assert_eq!(page.eval("[...document.querySelectorAll('[data-statistic]')].filter((f) => !f.hidden).every((f) => f.dataset.statistic === 'rms')"), true);
     click(&mut page, "statistic", "mean");
-    let svg = "document.querySelector('[data-fit=\"0\"] [data-over=pair][data-rms=false] svg')";
+    let svg = "document.querySelector('[data-fit=\"0\"] [data-over=pair][data-statistic=mean] svg')";
     page.eval(&format!("{svg}.scrollIntoView({{ block: 'center', behavior: 'instant' }})"));
     let list = |v: &Value| v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect::<Vec<f64>>();
     let (x, y) = (list(&map["columns_deg"]), list(&map["rows_deg"]));
@@ -134,7 +146,9 @@ fn pictures() -> [Image; 2] {
 
 /// Colour of a pixel of a canvas.
 fn painted(page: &mut Page, canvas: &str, x: usize, y: usize) -> Vec<i64> {
-    let color = page.eval(&format!("[...document.querySelector('{canvas}').getContext('2d').getImageData({x}, {y}, 1, 1).data].slice(0, 3)"));
+    let color = page.eval(&format!(
+        "[...document.querySelector('{canvas}').getContext('2d').getImageData({x}, {y}, 1, 1).data].slice(0, 3)"
+    ));
     color.as_array().unwrap().iter().map(|v| v.as_i64().unwrap()).collect()
 }
 
@@ -169,7 +183,10 @@ fn the_viewer_develops_compares_and_reads_the_pictures_radiance() {
         let difference = luminance(lambert.radiance[i]) - luminance(truth.radiance[i]);
         let want = ColorMap::Diverging.color(0.5 + 0.5 * difference / range);
         let found = painted(&mut page, "#canvas-b", x, y);
-        assert!(found.iter().zip(want).all(|(a, b)| (a - i64::from(b)).abs() <= 3), "({x}, {y}): {found:?} vs {want:?}");
+        assert!(
+            found.iter().zip(want).all(|(a, b)| (a - i64::from(b)).abs() <= 3),
+            "({x}, {y}): {found:?} vs {want:?}"
+        );
     }
     click(&mut page, "view", "slider");
     page.eval("document.querySelector('#stage').scrollIntoView({ block: 'center', behavior: 'instant' })");
@@ -190,7 +207,9 @@ fn the_viewer_develops_compares_and_reads_the_pictures_radiance() {
         }
     }
     // The slider divides the two.
-    page.eval("(() => { const e = document.querySelector('#split'); e.value = 20; e.dispatchEvent(new Event('input')); })()");
+    page.eval(
+        "(() => { const e = document.querySelector('#split'); e.value = 20; e.dispatchEvent(new Event('input')); })()",
+    );
     assert_eq!(page.eval("getComputedStyle(document.querySelector('.second')).clipPath"), "inset(0px 0px 0px 20%)");
 }
 
@@ -198,7 +217,9 @@ fn the_viewer_develops_compares_and_reads_the_pictures_radiance() {
 fn the_tables_hold_the_numbers_of_the_json() {
     let Some(mut page) = page_or_skip("the_tables_hold_the_numbers_of_the_json") else { return };
     open(&mut page);
-    let rows = page.eval("[...document.querySelectorAll('table.parameters tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))");
+    let rows = page.eval(
+        "[...document.querySelectorAll('table.parameters tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))",
+    );
     let numbers = Run::shared().numbers();
     let rows = rows.as_array().unwrap();
     assert_eq!(rows.len(), 7);
@@ -217,7 +238,12 @@ fn the_tables_hold_the_numbers_of_the_json() {
     }
     let exponent = rows.iter().find(|r| r[0].as_str().unwrap().contains("exponent")).unwrap();
     let found = numbers_in(&exponent[4].as_str().unwrap().replace('±', " "));
-    close(found[0], numbers["fits"][1]["material"]["lobes"][1]["shape"]["exponent"].as_f64().unwrap(), 1e-5, "exponent");
+    close(
+        found[0],
+        numbers["fits"][1]["material"]["lobes"][1]["shape"]["exponent"].as_f64().unwrap(),
+        1e-5,
+        "exponent",
+    );
     let compared = page.eval("[...document.querySelectorAll('#pictures ~ .scroll tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))");
     for (row, key) in [(0, "rmse"), (1, "rel_mse"), (2, "psnr"), (6, "max_abs")] {
         for fit in 0..2 {

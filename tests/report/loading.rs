@@ -45,7 +45,9 @@ fn without_scripts_pictures_and_lobes_are_there_and_controls_are_not() {
         // What is not laid out has no box.
         page.try_call("DOM.getBoxModel", json!({ "nodeId": found["nodeId"] })).is_ok()
     };
-    for selector in [".shots img", "#lobe-frames [data-channel]:not([hidden]) svg .series path", "[data-rms=true] svg"] {
+    for selector in
+        [".shots img", "#lobe-frames [data-channel]:not([hidden]) svg .series path", "[data-statistic=rms] svg"]
+    {
         assert!(is_shown(selector), "{selector}");
     }
     for selector in ["#lobe-controls", "#residual-controls", "#viewer", "#theme", "#lobe-readout"] {
@@ -61,7 +63,7 @@ fn on_paper_still_pictures_take_the_place_of_controls() {
     page.wait_for("document.querySelector('#viewer').dataset.ready === 'true'");
     page.call("Emulation.setEmulatedMedia", json!({ "media": "print" }));
     let shown = |selector: &str| format!("document.querySelector('{selector}').getClientRects().length > 0");
-    for selector in [".shots", ".shots img", "#lobe-frames svg"] {
+    for selector in [".shots", ".shots img", "#lobe-frames [data-channel]:not([hidden]) svg"] {
         assert_eq!(page.eval(&shown(selector)), true, "{selector}");
     }
     for selector in ["#viewer", "#lobe-controls", "nav", "#theme"] {

@@ -38,16 +38,16 @@ pub(super) struct CurveArgs {
 }
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  goniofit plot residuals lab.csv lab.json --rms --out residuals.svg")]
+#[command(after_help = "Example:\n  goniofit plot residuals lab.csv lab.json --statistic rms --out residuals.svg")]
 pub(super) struct ResidualArgs {
     /// The measurement
     pub measurement: PathBuf,
     /// A fit of it
     #[arg(value_name = "FIT.json")]
     pub fit: String,
-    /// How far the fit is off, rather than which way
-    #[arg(long)]
-    rms: bool,
+    /// What a cell shows: which way the fit is off (mean), how far (rms), or the mean over its own error, which noise alone keeps near 1
+    #[arg(long, default_value = "mean", value_parser = parse_statistic, value_name = "mean|rms|over-noise")]
+    statistic: Statistic,
     /// Leave out readings with θi or θo above this, degrees, as the fit did
     #[arg(long, default_value_t = 80.0, value_name = "DEG", value_parser = parse_incidence)]
     max_angle: f64,
@@ -62,6 +62,11 @@ pub(super) struct ResidualArgs {
 fn parse_incidence(text: &str) -> Result<f64, String> {
     let value = text.trim().parse::<f64>().ok().filter(|v| (0.0..=90.0).contains(v));
     value.ok_or_else(|| "expected degrees from 0 to 90".into())
+}
+
+fn parse_statistic(text: &str) -> Result<Statistic, String> {
+    let known = Statistic::ALL.into_iter().find(|s| s.name() == text);
+    known.ok_or_else(|| format!("known are {}", Statistic::ALL.map(Statistic::name).join(", ")))
 }
 
 /// Polar lobes, or slices: a panel an incidence.
@@ -124,7 +129,7 @@ pub(super) fn residuals(args: &ResidualArgs) -> Result<Drawn, Failure> {
     }
     let sight = args.through.as_deref().map(crate::cli::instrument::read_sight).transpose()?;
     let maps = residual_maps(&table, &Predicted::new(&material, sight), args.max_angle);
-    let statistic = if args.rms { Statistic::Rms } else { Statistic::Mean };
+    let statistic = args.statistic;
     let all: Vec<(&Binned, bool)> = maps.half_diff.iter().map(|m| (m, true)).chain([(&maps.in_out, false)]).collect();
     let range = residual_range(&maps, statistic);
     let draw = |(map, over_half): &(&Binned, bool)| {
@@ -139,7 +144,7 @@ pub(super) fn residuals(args: &ResidualArgs) -> Result<Drawn, Failure> {
     };
     let object = json!({
         "values": maps.count, "rmse": maps.rmse, "unit": maps.unit,
-        "statistic": if args.rms { "rms" } else { "mean" }, "maps": all.iter().map(of).collect::<Vec<_>>(),
+        "statistic": statistic.name(), "maps": all.iter().map(of).collect::<Vec<_>>(),
     });
     let title = format!("residuals of {} in {}", material.model(), args.measurement.display());
     Ok((Figure::grid(&panels, 2, &title), object))

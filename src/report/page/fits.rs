@@ -17,6 +17,8 @@ pub(super) struct Cell {
     pub note: String,
     /// How far from the truth, standard errors.
     pub off: Option<String>,
+    /// How far the model's own error moves it, where that is more than noise does.
+    pub model_error: Option<String>,
 }
 
 /// A parameter in all fits.
@@ -110,6 +112,7 @@ struct Parameter {
     value: f64,
     error: Option<f64>,
     interval: Option<(f64, f64)>,
+    model_error: Option<f64>,
     undetermined: bool,
     fitted: bool,
 }
@@ -135,7 +138,8 @@ impl Parameter {
             let z = if z.abs() < 100.0 { format!("{z:+.1}") } else { format!("{z:+.0}") };
             crate::report::plot::minus(&format!("{z} σ from truth"))
         });
-        Cell { value, error, note, off }
+        let model_error = self.model_error.filter(|m| *m > self.error.unwrap_or(f64::INFINITY));
+        Cell { value, error, note, off, model_error: model_error.map(|m| crate::report::words::digits(m, 2)) }
     }
 }
 
@@ -153,25 +157,44 @@ fn parameters(material: &Material) -> Vec<Parameter> {
     for (l, lobe) in material.lobes.iter().enumerate() {
         let name = material.lobe_name(l);
         let (errors, intervals) = (record.standard_error.get(l), record.interval_95.get(l));
-        let mut push = |name: String, unit, value, error: Option<f64>, interval| {
+        let moved = record.model_error.get(l);
+        let mut push = |name: String, unit, value, error: Option<f64>, interval, model_error| {
             let undetermined = record.undetermined.contains(&name);
-            list.push(Parameter { name, unit, value, error, interval, undetermined, fitted: material.fit.is_some() });
+            list.push(Parameter {
+                name,
+                unit,
+                value,
+                error,
+                interval,
+                model_error,
+                undetermined,
+                fitted: material.fit.is_some(),
+            });
         };
         for (c, weight) in lobe.weight.iter().enumerate() {
             let error = errors.and_then(|r| r.weight.get(c).copied().flatten());
             let interval = intervals.and_then(|r| r.weight.get(c).copied().flatten());
-            push(format!("{name}.weight[{}]", material.channels[c]), "1", *weight, error, interval);
+            let model_error = moved.and_then(|r| r.weight.get(c).copied().flatten());
+            push(format!("{name}.weight[{}]", material.channels[c]), "1", *weight, error, interval, model_error);
         }
         for (i, known) in lobe.kind.lobe().parameters().iter().enumerate() {
             let Some(shape) = lobe.shape.as_ref().and_then(|s| s.get(i)) else { continue };
             let at = |c: usize| errors.and_then(|r| r.shape.get(i)).and_then(|(_, e)| e.get(c)).flatten();
             let within = |c: usize| intervals.and_then(|r| r.shape.get(i)).and_then(|(_, e)| e.get(c)).flatten();
+            let model = |c: usize| moved.and_then(|r| r.shape.get(i)).and_then(|(_, e)| e.get(c)).flatten();
             let label = format!("{name}.{}", known.name);
             match shape {
-                PerChannel::Shared(value) => push(label, known.unit, *value, at(0), within(0)),
+                PerChannel::Shared(value) => push(label, known.unit, *value, at(0), within(0), model(0)),
                 PerChannel::Each(values) => {
                     for (c, value) in values.iter().enumerate() {
-                        push(format!("{label}[{}]", material.channels[c]), known.unit, *value, at(c), within(c));
+                        push(
+                            format!("{label}[{}]", material.channels[c]),
+                            known.unit,
+                            *value,
+                            at(c),
+                            within(c),
+                            model(c),
+                        );
                     }
                 }
             }
@@ -209,9 +232,7 @@ fn merits(run: &Run) -> Vec<Merit> {
             None => count(r.samples),
         }),
         ("rmse", |f, r| with_unit(r.rmse, f, r)),
-        ("of it noise", |f, r| {
-            r.residual.as_ref().map_or("–".into(), |x| with_unit(x.noise_rmse, f, r))
-        }),
+        ("of it noise", |f, r| r.residual.as_ref().map_or("–".into(), |x| with_unit(x.noise_rmse, f, r))),
         ("of it the model's own error", |f, r| {
             r.residual.as_ref().map_or("–".into(), |x| with_unit(x.model_rmse, f, r))
         }),

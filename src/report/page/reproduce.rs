@@ -53,8 +53,14 @@ fn commands(run: &Run) -> Vec<Command> {
         push("the map of the hemisphere", &["goniofit", "plot", "coverage", path, "--out", "coverage.svg"]);
         push("polar lobes", &[&["goniofit", "plot", "polar", path][..], &files, &["--out", "lobes.svg"]].concat());
         push("slices", &[&["goniofit", "plot", "slice", path][..], &files, &["--out", "slices.svg"]].concat());
-        for file in &files {
-            push("residual maps", &["goniofit", "plot", "residuals", path, file, "--out", "residuals.svg"]);
+        for fit in &run.fits {
+            let mut words = vec!["goniofit", "plot", "residuals", path, &fit.file];
+            let seen = fit.material().fit.as_ref().is_some_and(|record| record.through.is_some());
+            if let Some(instrument) = run.instrument.as_deref().filter(|_| seen) {
+                words.extend(["--through", instrument]);
+            }
+            words.extend(["--out", "residuals.svg"]);
+            push("residual maps", &words);
         }
     }
     if let Some((first, others)) = run.pictures.split_first() {

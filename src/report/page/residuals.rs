@@ -12,7 +12,7 @@ const MAX_ANGLE: f64 = 80.0;
 
 pub(super) struct Residuals {
     pub label: String,
-    /// SVGs: mean over (θh, θd), mean over (θi, θo), then rms likewise; the first and third are empty in the flat world.
+    /// A map over (θh, θd), which the flat world does not have, and one over (θi, θo) of each statistic.
     pub maps: Vec<Map>,
     pub rmse: String,
     /// Where that is not the fit's own rmse, why.
@@ -22,7 +22,9 @@ pub(super) struct Residuals {
 
 pub(super) struct Map {
     pub over: &'static str,
-    pub rms: bool,
+    /// What its cells show, by name and in words.
+    pub statistic: &'static str,
+    pub words: &'static str,
     pub svg: String,
 }
 
@@ -34,11 +36,11 @@ pub(super) fn residuals(run: &Run) -> Vec<Residuals> {
         let over: Vec<(&Binned, bool, &'static str)> =
             maps.half_diff.iter().map(|m| (m, true, "half")).chain([(&maps.in_out, false, "pair")]).collect();
         let mut drawn = Vec::new();
-        for statistic in [Statistic::Mean, Statistic::Rms] {
+        for statistic in Statistic::ALL {
             let range = residual_range(&maps, statistic);
             for (map, over_half, over) in &over {
                 let figure = residual_figure(map, *over_half, statistic, range, (&fit.label, maps.unit), false);
-                drawn.push(Map { over, rms: statistic == Statistic::Rms, svg: figure.inline() });
+                drawn.push(Map { over, statistic: statistic.name(), words: words(statistic), svg: figure.inline() });
             }
         }
         let of_fit = fit.material().fit.as_ref().map_or(f64::NAN, |r| r.rmse);
@@ -57,11 +59,19 @@ pub(super) fn residuals(run: &Run) -> Vec<Residuals> {
     found
 }
 
+fn words(statistic: Statistic) -> &'static str {
+    match statistic {
+        Statistic::Mean => "Which way",
+        Statistic::Rms => "How far",
+        Statistic::OverNoise => "Beyond noise",
+    }
+}
+
 fn map_data(map: &Binned) -> Value {
     let borders = |list: &[f64]| list.iter().map(|b| rounded(*b)).collect::<Vec<_>>();
     let values = |s: Statistic| encoded(map.values(s).into_iter().map(|v| v.unwrap_or(f64::NAN) as f32));
     json!({
         "x": borders(&map.x_deg), "y": borders(&map.y_deg), "count": map.count,
-        "mean": values(Statistic::Mean), "rms": values(Statistic::Rms),
+        "mean": values(Statistic::Mean), "rms": values(Statistic::Rms), "noise": values(Statistic::OverNoise),
     })
 }

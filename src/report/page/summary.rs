@@ -29,7 +29,13 @@ pub(super) struct Summary {
 }
 
 pub(super) fn summary(run: &Run) -> Summary {
-    Summary { picture: super::pictures::cover(run), subtitle: subtitle(run), verdict: verdict(run), cards: cards(run), warnings: warnings(run) }
+    Summary {
+        picture: super::pictures::cover(run),
+        subtitle: subtitle(run),
+        verdict: verdict(run),
+        cards: cards(run),
+        warnings: warnings(run),
+    }
 }
 
 fn subtitle(run: &Run) -> String {

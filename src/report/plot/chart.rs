@@ -100,7 +100,7 @@ impl Default for Chart {
             series: Vec::new(),
             bars: true,
             legend: LegendPlace::Below,
-            size: (450.0, 330.0),
+            size: (430.0, 330.0),
         }
     }
 }

@@ -155,13 +155,8 @@ mod tests {
             color_label: String::new(),
             width: 300.0,
         };
-        let layers = map.layers();
-        assert_eq!(
-            layers,
-            [
-                (hex(ColorMap::Diverging.color(0.0)), "M1 1h1v1h-1z".to_owned()),
-                (hex(ColorMap::Diverging.color(1.0)), "M0 0h2v1h-2zM2 1h1v1h-1z".to_owned()),
-            ]
-        );
+        let layers = map.layers(&Area { left: 0.0, top: 0.0, width: 8.0, height: 4.0 });
+        let [low, high] = [0.0, 1.0].map(|t| hex(ColorMap::Diverging.color(t)));
+        assert_eq!(layers, [(low, "M4 2H6V0H4z".to_owned()), (high, "M0 4H6V2H0zM6 2H8V0H6z".to_owned())]);
     }
 }

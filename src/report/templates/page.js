@@ -205,14 +205,14 @@
     const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
     const floats = (text) => new Float32Array(bytes(text).buffer);
     for (const fit of data.residuals)
-      for (const map of Object.values(fit.maps)) Object.assign(map, { mean: floats(map.mean), rms: floats(map.rms) });
+      for (const map of Object.values(fit.maps)) for (const key of ["mean", "rms", "noise"]) map[key] = floats(map[key]);
     function show() {
-      const rms = chosen(form, "statistic") === "rms";
-      for (const figure of $$("[data-rms]")) figure.hidden = (figure.dataset.rms === "true") !== rms;
+      const statistic = chosen(form, "statistic");
+      for (const figure of $$("[data-statistic]")) figure.hidden = figure.dataset.statistic !== statistic;
     }
     form.addEventListener("change", show);
     show();
-    for (const figure of $$("[data-rms]"))
+    for (const figure of $$("[data-statistic]"))
       figure.addEventListener("pointermove", (event) => {
         const svg = $("svg", figure);
         const fit = data.residuals[+figure.parentElement.dataset.fit];
@@ -233,7 +233,7 @@
         const span = (list, n) => `${number(list[n], 3)}° to ${number(list[n + 1], 3)}°`;
         const unit = fit.unit ? ` ${fit.unit}` : "";
         const found = map.count[k]
-          ? `mean ${number(map.mean[k])}${unit}, rms ${number(map.rms[k])}${unit}, ${map.count[k]} values`
+          ? `mean ${number(map.mean[k])}${unit}, rms ${number(map.rms[k])}${unit}, mean over its error ${number(map.noise[k], 3)}, ${map.count[k]} values`
           : "no readings";
         readout.textContent = `${fit.label}, ${names[0]} ${span(map.x, i)}, ${names[1]} ${span(map.y, j)}: ${found}`;
       });

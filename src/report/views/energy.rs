@@ -66,7 +66,7 @@ pub fn energy_figure(curves: &[AlbedoCurve], channel: usize, name: &str, titled:
         x: Scale::degrees(0.0, 90.0),
         y: Scale::around(series.iter().flat_map(|s| &s.points).map(|p| p.y)),
         series,
-        size: (450.0, 290.0),
+        size: (430.0, 290.0),
         ..Chart::default()
     };
     chart.figure()

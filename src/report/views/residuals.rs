@@ -25,6 +25,8 @@ pub struct Binned {
     pub sum: Vec<f64>,
     /// Σ w r².
     pub squares: Vec<f64>,
+    /// Σ w² r²: the variance of Σ w r, were r nothing but independent noise.
+    pub variance: Vec<f64>,
 }
 
 /// What a cell shows.
@@ -34,6 +36,23 @@ pub enum Statistic {
     Mean,
     /// √(Σ w r² / Σ w): how far.
     Rms,
+    /// Σ w r / √(Σ w² r²): the mean over its own error. Noise alone gives numbers like those of a normal distribution, about 1.
+    OverNoise,
+}
+
+impl Statistic {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Mean, Self::Rms, Self::OverNoise];
+
+    /// Its name in options and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mean => "mean",
+            Self::Rms => "rms",
+            Self::OverNoise => "over-noise",
+        }
+    }
 }
 
 /// The residuals of a fit, over two pairs of angles.
@@ -55,7 +74,15 @@ impl Binned {
     fn new(x_deg: Vec<f64>, y_deg: Vec<f64>) -> Self {
         let cells = (x_deg.len() - 1) * (y_deg.len() - 1);
         let zero = vec![0.0; cells];
-        Self { x_deg, y_deg, count: vec![0; cells], weight: zero.clone(), sum: zero.clone(), squares: zero }
+        Self {
+            x_deg,
+            y_deg,
+            count: vec![0; cells],
+            weight: zero.clone(),
+            sum: zero.clone(),
+            squares: zero.clone(),
+            variance: zero,
+        }
     }
 
     fn cell(&self, x: f64, y: f64) -> Option<usize> {
@@ -73,13 +100,17 @@ impl Binned {
         self.weight[cell] += weight;
         self.sum[cell] += weight * r;
         self.squares[cell] += weight * r * r;
+        self.variance[cell] += (weight * r).powi(2);
     }
 
     fn join(&mut self, other: &Self) {
         self.count.iter_mut().zip(&other.count).for_each(|(a, b)| *a += b);
-        for (a, b) in
-            [(&mut self.weight, &other.weight), (&mut self.sum, &other.sum), (&mut self.squares, &other.squares)]
-        {
+        for (a, b) in [
+            (&mut self.weight, &other.weight),
+            (&mut self.sum, &other.sum),
+            (&mut self.squares, &other.squares),
+            (&mut self.variance, &other.variance),
+        ] {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         }
     }
@@ -90,6 +121,8 @@ impl Binned {
         let of = |i: usize| match statistic {
             Statistic::Mean => self.sum[i] / self.weight[i],
             Statistic::Rms => (self.squares[i] / self.weight[i]).sqrt(),
+            Statistic::OverNoise if self.variance[i] > 0.0 => self.sum[i] / self.variance[i].sqrt(),
+            Statistic::OverNoise => 0.0,
         };
         (0..self.count.len()).map(|i| (self.weight[i] > 0.0).then(|| of(i))).collect()
     }
@@ -153,6 +186,7 @@ fn joined(maps: Vec<Binned>, channels: usize, totals: &Totals) -> [Binned; 2] {
             for list in [&mut map.weight, &mut map.sum, &mut map.squares] {
                 list.iter_mut().for_each(|x| *x *= factor);
             }
+            map.variance.iter_mut().for_each(|x| *x *= factor * factor);
             map
         };
         let (Some(first), Some(second)) = (maps.next(), maps.next()) else { break };
@@ -273,9 +307,15 @@ fn cells(maps: &[Binned], wi: DVec3, wo: DVec3) -> [Option<usize>; 2] {
     [half, maps[1].cell(degrees(wi), theta_o)]
 }
 
-/// Where the colours of both maps end: the 99th percentile of their cells' sizes, rounded up to 1, 2 or 5 times a power of ten; 1 where all are 0.
+/// Where colours of means over their error end: what noise alone reaches in one of millions of cells.
+const NOISE_RANGE: f64 = 5.0;
+
+/// Where the colours of both maps end: of means over their error at 5, else the 99th percentile of their cells' sizes, rounded up to 1, 2 or 5 times a power of ten; 1 where all are 0.
 #[must_use]
 pub fn residual_range(maps: &ResidualMaps, statistic: Statistic) -> f64 {
+    if statistic == Statistic::OverNoise {
+        return NOISE_RANGE;
+    }
     let cells = maps.half_diff.iter().chain([&maps.in_out]).flat_map(|m| m.values(statistic));
     let mut sizes: Vec<f64> = cells.flatten().map(f64::abs).filter(|v| *v > 0.0 && v.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -302,6 +342,7 @@ pub fn residual_figure(
     let (name, colors, low) = match statistic {
         Statistic::Mean => ("mean residual", ColorMap::Diverging, -range),
         Statistic::Rms => ("rms residual", ColorMap::Sequential, 0.0),
+        Statistic::OverNoise => ("mean residual over its error", ColorMap::Diverging, -range),
     };
     let map = HeatMap {
         title: format!("{title}, {name}"),
@@ -316,7 +357,13 @@ pub fn residual_figure(
         values: map.values(statistic),
         map: colors,
         range: (low, range),
-        color_label: if unit.is_empty() { "r".into() } else { format!("r [{}]", unit_text(unit)) },
+        color_label: if statistic == Statistic::OverNoise {
+            "σ".into()
+        } else if unit.is_empty() {
+            "r".into()
+        } else {
+            format!("r [{}]", unit_text(unit))
+        },
         width: 400.0,
     };
     map.figure()
@@ -370,6 +417,30 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn means_over_their_error_are_normal_where_only_noise_is_left_and_not_where_the_model_is_wrong() {
+        let table = paint();
+        let of = |model: &str| {
+            let material = fit(&table, &FitOptions::new(model.parse().expect("a model"))).expect("fits").material;
+            let maps = residual_maps(&table, &Predicted::new(&material, None), 80.0);
+            let cells: Vec<(f64, u64)> = maps
+                .in_out
+                .values(Statistic::OverNoise)
+                .into_iter()
+                .zip(&maps.in_out.count)
+                .filter_map(|(z, n)| Some((z?, *n)))
+                .collect();
+            cells.into_iter().filter(|(_, n)| *n >= 30).map(|(z, _)| z).collect::<Vec<f64>>()
+        };
+        let mean_square = |z: &[f64]| z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
+        let right = of("lambert+phong");
+        // z² has mean 1 and variance below 2: five standard errors of its mean over the cells.
+        let room = 5.0 * (2.0 / right.len() as f64).sqrt();
+        assert!((mean_square(&right) - 1.0).abs() < room, "{} of {} cells", mean_square(&right), right.len());
+        let wrong = of("lambert");
+        assert!(mean_square(&wrong) > 10.0, "{}", mean_square(&wrong));
     }
 
     #[test]

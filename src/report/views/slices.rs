@@ -202,7 +202,7 @@ pub fn polar_figure(slice: &Slice, channel: usize, name: &str, scale: Scale, uni
         series: series(slice, channel),
         incidence_deg: Some(slice.incidence_deg),
         legend: true,
-        width: 450.0,
+        width: 430.0,
     };
     chart.figure()
 }
