@@ -80,7 +80,7 @@ fn residuals_add_up_to_the_fits_own_and_coverage_is_the_scans() {
 fn what_cannot_be_drawn_is_said() {
     let b = Bench::new();
     b.fitted("p.csv", "p.json");
-    b.ok(&["simulate", "--material", "satin", "--scan", "flat:5", "--out", "flat.csv"]);
+    b.write("flat.csv", std::fs::read(fixture("measurements/in-plane-flat-world.csv")).expect("reads"));
     for (args, expected) in [
         (&["slice", "p.csv", "--out", "f.pdf"][..], "--out: expected a name that ends in .svg or .png"),
         (&["slice", "p.csv", "--channel", "x", "--out", "f.svg"], "--channel: expected one of r, g, b, found x"),
@@ -119,7 +119,7 @@ fn every_format_and_the_flat_world_can_be_drawn_and_reported() {
         }
         assert!(drawn > 0, "nothing of {file}");
     }
-    b.ok(&["simulate", "--material", "satin", "--scan", "flat:5", "--out", "flat.csv"]);
+    b.write("flat.csv", std::fs::read(fixture("measurements/in-plane-flat-world.csv")).expect("reads"));
     b.ok(&["fit", "flat.csv", "--model", "lambert2d+phong2d", "--out", "flat.json", "--report"]);
     let found = b.json(&["plot", "slice", "flat.csv", "flat.json", "--out", "f.svg"]);
     assert_eq!(found["unit"], "1/rad");

@@ -111,6 +111,9 @@ fn outline(center: (f64, f64), radius: f64, cell: &DiscCell) -> String {
     };
     let (inner, outer) = cell.theta_deg;
     let (from, to) = cell.phi_deg;
+    if inner == 0.0 && to - from >= 360.0 {
+        return ring(center, radius * projected(outer));
+    }
     let mut d = String::new();
     let point = |(x, y): (f64, f64)| format!("{} {}", short(x), short(y));
     let arc = |theta: f64, sweep: u8, phi: f64| {

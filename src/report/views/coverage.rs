@@ -41,35 +41,39 @@ pub fn coverage(table: &Measurement) -> Option<Coverage> {
         return None;
     }
     let step = steps(table);
-    let (theta, phi) = (borders(step.0), turn(step.1));
-    let columns = phi.len();
+    let grid = cells(step);
+    let (theta, columns) = (borders(step.0), turn(step.1).len());
     let counts = map_blocks(table.len(), |block| {
-        let mut counts = vec![(0u64, 0u64); (theta.len() - 1) * columns];
+        let mut counts = vec![(0u64, 0u64); grid.len()];
         for i in block {
             let Some((t, p)) = place(table, i) else { continue };
             let row = theta.partition_point(|b| *b <= t).clamp(1, theta.len() - 1) - 1;
             let column = ((p + 0.5 * step.1).rem_euclid(360.0) / step.1) as usize;
-            let cell = &mut counts[row * columns + column.min(columns - 1)];
+            let cell = &mut counts[if row == 0 { 0 } else { 1 + (row - 1) * columns + column.min(columns - 1) }];
             for c in 0..table.channels.len() {
                 if table.value(c, i).is_some() { cell.0 += 1 } else { cell.1 += 1 }
             }
         }
         counts
     });
-    let mut total = vec![(0, 0); (theta.len() - 1) * columns];
+    let mut cells = grid;
     for part in counts {
-        total.iter_mut().zip(part).for_each(|(a, b)| *a = (a.0 + b.0, a.1 + b.1));
+        for (cell, (valid, masked)) in cells.iter_mut().zip(part) {
+            (cell.valid, cell.masked) = (cell.valid + valid, cell.masked + masked);
+        }
     }
-    let cell = |(k, (valid, masked)): (usize, &(u64, u64))| CoverageCell {
-        theta_deg: (theta[k / columns], theta[k / columns + 1]),
-        phi_deg: phi[k % columns],
-        valid: *valid,
-        masked: *masked,
-    };
-    let cells: Vec<CoverageCell> = total.iter().enumerate().map(cell).collect();
     let covered = cells.iter().filter(|c| c.valid > 0).map(CoverageCell::solid_angle).sum::<f64>() / TAU;
     let (valid, masked) = cells.iter().fold((0, 0), |(v, m), c| (v + c.valid, m + c.masked));
     Some(Coverage { cells, covered, masked: masked as f64 / (valid + masked).max(1) as f64, step_deg: step })
+}
+
+/// Empty cells: the cap about the normal, where azimuth says nothing, then ring by ring.
+fn cells((theta, phi): (f64, f64)) -> Vec<CoverageCell> {
+    let empty = |theta_deg, phi_deg| CoverageCell { theta_deg, phi_deg, valid: 0, masked: 0 };
+    let rings = borders(theta);
+    let cap = empty((0.0, rings[1]), (0.0, 360.0));
+    let others = rings[1..].windows(2).flat_map(|ring| turn(phi).into_iter().map(|phi| empty((ring[0], ring[1]), phi)));
+    std::iter::once(cap).chain(others).collect()
 }
 
 impl CoverageCell {
