@@ -6,7 +6,7 @@ use crate::browser::page_or_skip;
 use crate::run::Run;
 
 /// Every violation as a line.
-const STRUCTURE: &str = r##"(() => {
+const STRUCTURE: &str = r#"(() => {
   const wrong = [];
   const all = (s) => [...document.querySelectorAll(s)];
   const name = (e) =>
@@ -45,10 +45,10 @@ const STRUCTURE: &str = r##"(() => {
   for (const e of all("[tabindex]")) if (e.tabIndex > 0) wrong.push("tabindex");
   if (/user-scalable=no|maximum-scale/.test(document.querySelector("meta[name=viewport]").content)) wrong.push("meta-viewport");
   return wrong;
-})()"##;
+})()"#;
 
 /// Text whose contrast is too low: 4.5 to 1, or 3 to 1 where it is large.
-const CONTRAST: &str = r##"(() => {
+const CONTRAST: &str = r#"(() => {
   const parse = (text) => {
     const [r, g, b, a = 1] = text.match(/[\d.]+/g).map(Number);
     return [r, g, b, a];
@@ -79,10 +79,10 @@ const CONTRAST: &str = r##"(() => {
     if (ratio < (large ? 3 : 4.5)) wrong.push(`${ratio.toFixed(2)}: ${e.tagName}.${e.getAttribute("class")} ${e.textContent.trim().slice(0, 40)}`);
   }
   return [...new Set(wrong)];
-})()"##;
+})()"#;
 
 /// Lines of plots that stand for data: 3 to 1 against what is below (WCAG 1.4.11).
-const LINES: &str = r##"(() => {
+const LINES: &str = r#"(() => {
   const luminance = (text) => {
     const [r, g, b] = text.match(/[\d.]+/g).slice(0, 3).map((v) => ((v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
@@ -91,7 +91,7 @@ const LINES: &str = r##"(() => {
   const found = [...document.querySelectorAll(".plot .line, .plot .ref")].map((e) => getComputedStyle(e).stroke);
   const ratio = (a) => (Math.max(a, below) + 0.05) / (Math.min(a, below) + 0.05);
   return [...new Set(found)].filter((stroke) => ratio(luminance(stroke)) < 3);
-})()"##;
+})()"#;
 
 #[test]
 fn the_page_passes_the_checks_of_accessibility() {

@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 /// Names under which a browser may be installed.
 const NAMES: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
 /// Longest wait for an answer.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A page in a browser of its own.
 pub struct Page {

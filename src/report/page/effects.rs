@@ -69,13 +69,12 @@ fn instrument(run: &Run) -> Option<Listed> {
 fn scene(run: &Run) -> Option<Listed> {
     let name = run.scene.as_deref()?;
     let found = run.effects.as_ref().filter(|e| e["scene"] == name);
-    let effects = match found {
-        Some(found) => found["effects"].as_array()?.iter().map(told).collect(),
-        None => {
-            let truth = run.truth.as_ref().map(Predicted::material);
-            let material = run.fits.last().map(RunFit::material).or(truth)?;
-            plain(scene_plan(&Stage::built_in(name).ok()?, material).ok()?)
-        }
+    let effects = if let Some(found) = found {
+        found["effects"].as_array()?.iter().map(told).collect()
+    } else {
+        let truth = run.truth.as_ref().map(Predicted::material);
+        let material = run.fits.last().map(RunFit::material).or(truth)?;
+        plain(scene_plan(&Stage::built_in(name).ok()?, material).ok()?)
     };
     let out = run.folder.join("effects.json").display().to_string();
     let command = format!("{} > {}", typed(&["goniofit", "effects", "--scene", name, "--json"]), typed(&[&out]));

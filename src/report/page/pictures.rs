@@ -105,7 +105,7 @@ pub(super) fn cover(run: &Run) -> Option<(String, String)> {
 
 /// By how much pictures are made smaller so that all fit.
 fn factor(pixels: usize) -> usize {
-    (1..).find(|f| pixels / (f * f) <= MOST_PIXELS).unwrap_or(1)
+    (pixels as f64 / MOST_PIXELS as f64).sqrt().ceil().max(1.0) as usize
 }
 
 fn difference_shot(

@@ -67,13 +67,19 @@ fn verdict(run: &Run) -> Vec<String> {
     let Some(fit) = best(run) else { return vec!["There is no fit to judge.".into()] };
     if let Some(residual) = fit.material().fit.as_ref().and_then(|r| r.residual.as_ref()) {
         let known = if residual.noise_from == "sigma" { "stated noise" } else { "noise between neighbours" };
-        said.push(if residual.model_rmse <= 0.05 * residual.noise_rmse {
+        let share = percent(residual.structured_share);
+        said.push(if residual.structured_share <= 0.05 {
             format!("{} describes the readings to within their {known}.", fit.label)
+        } else if residual.structured_share <= 0.5 {
+            format!(
+                "{} describes the readings to little more than their {known}: {share} of the residuals' variance is structure, the model's or of errors that \
+                 readings share.",
+                fit.label
+            )
         } else {
             format!(
-                "{} comes closest, but cannot bend as the material does: {} of the residuals' variance is structure, not noise.",
-                fit.label,
-                percent(residual.structured_share)
+                "{} comes closest, but cannot bend as the material does: {share} of the residuals' variance is structure, not noise.",
+                fit.label
             )
         });
     }

@@ -137,7 +137,7 @@ impl Scale {
         for k in from..=to {
             for digit in 1..10 {
                 let value = f64::from(digit) * 10f64.powi(k);
-                let named = if decades < 1.7 { matches!(digit, 1 | 2 | 5) } else { digit == 1 && k % every == 0 };
+                let named = if decades < 2.2 { matches!(digit, 1 | 2 | 5) } else { digit == 1 && k % every == 0 };
                 if inside(value) && (named || every == 1 || digit == 1) {
                     ticks.push(Tick { value, label: if named { decade_label(digit, k) } else { String::new() } });
                 }

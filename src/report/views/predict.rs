@@ -58,7 +58,7 @@ impl Predicted {
                 let Some(shape) = term.shape_of(c) else { continue };
                 let mut values = vec![0.0; known.len()];
                 let mut derivatives = vec![vec![0.0; known.len()]; MAX_PARAMETERS.min(shape.len())];
-                sight.prepare(term.kind, &shape, Instant::now() + Duration::from_secs(3600));
+                sight.prepare(term.kind, &shape, Instant::now() + Duration::from_hours(1));
                 sight.fill(term.kind, &shape, &known, &mut values, &mut derivatives);
                 sum.iter_mut().zip(&values).for_each(|(s, v)| *s += term.weight[c] * v);
             }
