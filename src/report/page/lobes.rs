@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::measurement::Dimension;
 use crate::report::plot::{Scale, dot_class, line_class};
 use crate::report::run::Run;
 use crate::report::views::{
@@ -47,67 +48,69 @@ pub(super) fn colors(run: &Run) -> Vec<usize> {
 }
 
 pub(super) fn lobes(run: &Run) -> Option<Lobes> {
-    let mut shown =
-        Shown { table: run.table.as_ref().ok().map(|t| (&t.measurement, t.brdf.as_ref().ok())), materials: Vec::new() };
-    if let Some(truth) = &run.truth {
-        shown.materials.push(("truth".into(), truth, usize::MAX));
-    }
-    let fits = run.fits.iter().zip(colors(run)).map(|(f, color)| (f.label.clone(), &f.predicted, color));
-    shown.materials.extend(fits);
-    let names = match (&run.table, run.fits.first()) {
-        (Ok(table), _) => &table.measurement.channels,
-        (Err(_), Some(fit)) => &fit.material().channels,
-        (Err(_), None) => return None,
-    };
-    shown.materials.retain(|(_, m, _)| m.material().channels.len() == names.len());
+    let (shown, names) = subjects(run)?;
     let angles = incidences(shown.table.map(|(t, _)| t), INCIDENCES);
     let slices: Vec<Slice> = angles.iter().map(|t| slice(&shown, *t)).filter(|s| !s.curves.is_empty()).collect();
     let first = slices.iter().position(|s| s.incidence_deg >= 29.0).unwrap_or(slices.len().saturating_sub(1));
     let start = slices.get(first)?;
-    let unit = run.table.as_ref().map_or("1/sr", |t| t.unit());
-    let chosen = shown_channels(names);
-    let channel = default_channel(names);
+    let unit = if is_flat(run) { "1/rad" } else { "1/sr" };
+    let (chosen, channel) = (shown_channels(names), default_channel(names));
     let log = is_wide(&slices, channel);
-    let mut frames = Vec::new();
-    for &c in &chosen {
-        for on_log in [false, true] {
-            let scale: Scale = scale_of(&slices, c, on_log);
-            // Frames of other channels and scales are filled by the script.
-            let is_shown = c == channel && on_log == log;
-            let empty =
-                Slice { incidence_deg: start.incidence_deg, curves: start.curves.iter().map(emptied).collect() };
-            let of = if is_shown { start } else { &empty };
-            frames.push(Frame {
-                channel: c,
-                log: on_log,
-                polar: polar_figure(of, c, &names[c], scale, unit, false).inline(),
-                slice: slice_figure(of, c, &names[c], scale, unit, false).inline(),
-                shown: is_shown,
-            });
-        }
-    }
+    let both = chosen.iter().flat_map(|&c| [false, true].map(|on_log| (c, on_log)));
+    let frames = both.map(|(c, on_log)| {
+        let scale = scale_of(&slices, c, on_log);
+        let is_shown = c == channel && on_log == log;
+        frame(start, (c, &names[c]), (scale, on_log), unit, is_shown)
+    });
     let scale = scale_of(&slices, channel, log);
     let small = |s: &Slice| {
-        (
-            format!("θi = {}°", number(s.incidence_deg)),
-            polar_figure(s, channel, &names[channel], scale, unit, false).inline(),
-        )
+        let svg = polar_figure(s, channel, &names[channel], scale, unit, false).inline();
+        (format!("θi = {}°", number(s.incidence_deg)), svg)
+    };
+    let incidence = |(k, s): (usize, &Slice)| Choice {
+        index: k,
+        label: format!("{}°", number(s.incidence_deg)),
+        chosen: k == first,
     };
     Some(Lobes {
-        incidences: slices
-            .iter()
-            .enumerate()
-            .map(|(k, s)| Choice { index: k, label: format!("{}°", number(s.incidence_deg)), chosen: k == first })
-            .collect(),
+        incidences: slices.iter().enumerate().map(incidence).collect(),
         channels: chosen.iter().map(|&c| Choice { index: c, label: names[c].clone(), chosen: c == channel }).collect(),
         log,
-        frames,
+        frames: frames.collect(),
         all: slices.iter().map(small).collect(),
         data: json!({
             "unit": unit, "channels": names, "incidences": slices.iter().map(|s| s.incidence_deg).collect::<Vec<_>>(),
             "slices": slices.iter().map(|s| s.curves.iter().map(curve).collect::<Vec<_>>()).collect::<Vec<_>>(),
         }),
     })
+}
+
+/// Table, truth and fits of the same channels, and the channels' names.
+fn subjects(run: &Run) -> Option<(Shown<'_>, &[String])> {
+    let table = run.table.as_ref().ok().map(|t| (&t.measurement, t.brdf.as_ref().ok()));
+    let names = match (table, run.fits.first()) {
+        (Some((table, _)), _) => &table.channels,
+        (None, Some(fit)) => &fit.material().channels,
+        (None, None) => return None,
+    };
+    let truth = run.truth.iter().map(|truth| ("truth".to_owned(), truth, usize::MAX));
+    let fits = run.fits.iter().zip(colors(run)).map(|(f, color)| (f.label.clone(), &f.predicted, color));
+    let materials = truth.chain(fits).filter(|(_, m, _)| m.material().channels.len() == names.len());
+    Some((Shown { table, materials: materials.collect() }, names))
+}
+
+fn is_flat(run: &Run) -> bool {
+    let of_fit = || run.fits.first().is_some_and(|f| f.material().is_flat());
+    run.table.as_ref().map_or_else(|_| of_fit(), |t| t.measurement.dimension == Dimension::Flat)
+}
+
+/// The frame of a channel and scale; the script fills those that are not shown at first.
+fn frame(start: &Slice, (c, name): (usize, &str), (scale, log): (Scale, bool), unit: &str, shown: bool) -> Frame {
+    let empty = Slice { incidence_deg: start.incidence_deg, curves: start.curves.iter().map(emptied).collect() };
+    let of = if shown { start } else { &empty };
+    let polar = polar_figure(of, c, name, scale, unit, false).inline();
+    let slice = slice_figure(of, c, name, scale, unit, false).inline();
+    Frame { channel: c, log, polar, slice, shown }
 }
 
 /// At most so many channels, the first and the last among them.

@@ -1,5 +1,6 @@
 //! The page: a run as one HTML file.
 
+mod compared;
 mod data;
 mod effects;
 mod fits;
@@ -132,7 +133,8 @@ fn css() -> String {
     let variables = super::plot::variables;
     let dark = variables(&DARK);
     format!(
-        ":root{{{}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}@media screen{{:root[data-theme=dark]{{{dark}}}}}\n{}\n{}",
+        ":root{{{}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}\
+         @media screen{{:root[data-theme=dark]{{{dark}}}}}\n{}\n{}",
         variables(&LIGHT),
         include_str!("../templates/page.css"),
         page_css()

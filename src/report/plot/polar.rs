@@ -4,7 +4,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::Figure;
 use super::canvas::{Canvas, Mark, Px, line, short};
-use super::chart::{Marks, Series, dot_class, draw_legend, legend_rows, line_class};
+use super::chart::{Marks, Series};
+use super::legend::{dot_class, draw_legend, legend_rows, line_class};
 use super::scale::Scale;
 
 /// A polar chart over the half-plane above a surface: angles from −90° to 90°, 0° upwards, positive to the right.
