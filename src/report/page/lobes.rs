@@ -128,8 +128,9 @@ fn shown_channels(names: &[String]) -> Vec<usize> {
 
 /// Whether a linear scale would hide most of the curves.
 fn is_wide(slices: &[Slice], channel: usize) -> bool {
-    let mut values: Vec<f64> =
-        slices.iter().flat_map(|s| &s.curves).filter_map(|c| c.values.get(channel)).flatten().copied().collect();
+    // The table's own curve decides, where there is one.
+    let curves = slices.iter().filter_map(|s| s.curves.first());
+    let mut values: Vec<f64> = curves.filter_map(|c| c.values.get(channel)).flatten().copied().collect();
     values.retain(|v| *v > 0.0);
     values.sort_by(f64::total_cmp);
     let (Some(most), Some(middle)) = (values.last(), values.get(values.len() / 2)) else { return false };

@@ -113,7 +113,7 @@ impl Chart {
         let top = if self.titled { 52.0 } else { 30.0 };
         let area = Area { left: 54.0, top, width: width - 54.0 - 16.0, height: height - top - 46.0 };
         let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), s.marks, s.color)).collect();
-        let rows = if self.legend == LegendPlace::Below { legend_rows(&names, width - 40.0) } else { Vec::new() };
+        let rows = if self.legend == LegendPlace::Below { legend_rows(&names, width - 20.0) } else { Vec::new() };
         let mut canvas = Canvas::new(width, height + 18.0 * rows.len() as f64);
         if self.titled {
             canvas.text("head", (10.0, 20.0), &self.title);

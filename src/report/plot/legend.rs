@@ -31,7 +31,7 @@ pub(in crate::report) type Entry<'a> = (f64, &'a str, Marks, usize);
 pub(in crate::report) fn legend_rows<'a>(names: &[(&'a str, Marks, usize)], width: f64) -> Vec<Vec<Entry<'a>>> {
     let (mut rows, mut x) = (vec![Vec::new()], 0.0);
     for &(name, marks, color) in names.iter().filter(|(name, ..)| !name.is_empty()) {
-        let needed = 30.0 + text_width(name, 13.0) + 18.0;
+        let needed = 31.0 + text_width(name, 13.0) + 11.0;
         if x > 0.0 && x + needed > width {
             rows.push(Vec::new());
             x = 0.0;

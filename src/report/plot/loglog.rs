@@ -20,7 +20,7 @@ pub struct Slope {
 pub struct LogLog {
     /// What it shows.
     pub title: String,
-    /// Label of the horizontal axis, "time [s]" say.
+    /// Label of the horizontal axis, `time [s]` say.
     pub x_label: String,
     /// Label of the vertical axis.
     pub y_label: String,

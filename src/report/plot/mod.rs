@@ -87,7 +87,7 @@ impl Figure {
         self.markup(Some(style::paper_css()))
     }
 
-    /// SVG to stand in a page, which brings the style ([`page_css`]).
+    /// SVG to stand in a page, which brings the style.
     #[must_use]
     pub fn inline(&self) -> String {
         self.markup(None)
