@@ -14,3 +14,4 @@ pub mod measurement;
 pub mod numeric;
 pub mod radiometry;
 pub mod render;
+pub mod report;

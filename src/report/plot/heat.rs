@@ -1,0 +1,166 @@
+//! Values over a grid of cells, as colours with their scale.
+
+use std::fmt::Write;
+
+use super::Figure;
+use super::axes::{Area, Axis};
+use super::canvas::{Canvas, Mark, short};
+use super::scale::{Scale, minus, power_label};
+use crate::image::ColorMap;
+
+/// A map of values over two axes.
+#[derive(Debug, Clone)]
+pub struct HeatMap {
+    /// What it shows.
+    pub title: String,
+    /// More of that.
+    pub description: String,
+    /// Whether the title is drawn.
+    pub titled: bool,
+    /// Label of the horizontal axis, with its unit.
+    pub x_label: String,
+    /// Label of the vertical axis.
+    pub y_label: String,
+    /// The horizontal scale, linear.
+    pub x: Scale,
+    /// The vertical scale, linear.
+    pub y: Scale,
+    /// Number of columns and rows.
+    pub cells: (usize, usize),
+    /// Values, row by row from the bottom, each from the left; `None` is left empty.
+    pub values: Vec<Option<f64>>,
+    /// Colours.
+    pub map: ColorMap,
+    /// What the ends of the colours stand for.
+    pub range: (f64, f64),
+    /// What the colours stand for, with the unit.
+    pub color_label: String,
+    /// Width, CSS pixels.
+    pub width: f64,
+}
+
+/// Colours that are told apart.
+const LEVELS: usize = 41;
+
+impl HeatMap {
+    /// The drawing; its area is square.
+    #[must_use]
+    pub fn figure(&self) -> Figure {
+        let top = if self.titled { 52.0 } else { 30.0 };
+        let side = self.width - 54.0 - 92.0;
+        let area = Area { left: 54.0, top, width: side, height: side };
+        let mut canvas = Canvas::new(self.width, top + side + 46.0);
+        if self.titled {
+            canvas.text("head", (10.0, 20.0), &self.title);
+        }
+        let layers = self.layers();
+        let (columns, rows) = self.cells;
+        let (sx, sy) = (side / columns as f64, side / rows as f64);
+        let transform = format!("translate({} {}) scale({sx} {})", short(area.left), short(area.bottom()), -sy);
+        let cells = Mark::Cells { transform, layers };
+        canvas.marks.push(cells);
+        let x = Axis { label: &self.x_label, scale: self.x, labels: 4 };
+        let y = Axis { label: &self.y_label, scale: self.y, labels: 5 };
+        area.frame(&mut canvas, &x, &y, false);
+        self.bar(&mut canvas, &area);
+        Figure::new(canvas, &self.title, &self.description).with_data("area", area.data())
+    }
+
+    fn level(&self, value: f64) -> usize {
+        let place = (value - self.range.0) / (self.range.1 - self.range.0);
+        (place.clamp(0.0, 1.0) * (LEVELS - 1) as f64).round() as usize
+    }
+
+    /// One path a colour, runs of cells of a row as one rectangle.
+    fn layers(&self) -> Vec<(String, String)> {
+        let columns = self.cells.0.max(1);
+        let mut paths = vec![String::new(); LEVELS];
+        for (row, values) in self.values.chunks(columns).enumerate() {
+            let levels: Vec<Option<usize>> =
+                values.iter().map(|v| v.filter(|v| !v.is_nan()).map(|v| self.level(v))).collect();
+            let mut from = 0;
+            for run in levels.chunk_by(|a, b| a == b) {
+                if let Some(level) = run[0] {
+                    // Writing to a String can't fail.
+                    let _ = write!(paths[level], "M{from} {row}h{0}v1h-{0}z", run.len());
+                }
+                from += run.len();
+            }
+        }
+        let color = |k: usize| hex(self.map.color(k as f64 / (LEVELS - 1) as f64));
+        paths.into_iter().enumerate().filter(|(_, d)| !d.is_empty()).map(|(k, d)| (color(k), d)).collect()
+    }
+
+    /// The scale of colours, on the right.
+    fn bar(&self, canvas: &mut Canvas, area: &Area) {
+        color_bar(canvas, self.map, self.range, &self.color_label, (area.right() + 18.0, area.top, area.height));
+    }
+}
+
+/// A scale of colours at (left, top) with a height, its label above.
+pub(in crate::report) fn color_bar(
+    canvas: &mut Canvas,
+    map: ColorMap,
+    (low, high): (f64, f64),
+    label: &str,
+    (left, top, height): (f64, f64, f64),
+) {
+    const STEPS: usize = 60;
+    let layers = (0..STEPS).map(|k| {
+        let color = hex(map.color((k as f64 + 0.5) / STEPS as f64));
+        (color, format!("M0 {k}h1v1.05h-1z"))
+    });
+    let transform = format!("translate({} {}) scale(12 {})", short(left), short(top + height), -height / STEPS as f64);
+    canvas.marks.push(Mark::Cells { transform, layers: layers.collect() });
+    let scale = Scale::linear(low, high);
+    for tick in scale.ticks(4) {
+        let Some(place) = scale.place(tick.value) else { continue };
+        let y = top + height * (1.0 - place);
+        canvas.segment("axis", (left + 12.0, y), (left + 16.0, y));
+        canvas.text("tick", (left + 20.0, y + 4.0), &bar_label(tick.value, &tick.label));
+    }
+    canvas.text("tick", (left, top - 12.0), label);
+}
+
+/// Short, by a power of ten where it is small.
+fn bar_label(value: f64, label: &str) -> String {
+    let small = value != 0.0 && value.abs() < 0.01;
+    if small { power_label(value) } else { minus(label) }
+}
+
+/// `#rrggbb`.
+pub(in crate::report) fn hex([r, g, b]: [u8; 3]) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_joined_and_gaps_left_empty() {
+        let map = HeatMap {
+            title: String::new(),
+            description: String::new(),
+            titled: false,
+            x_label: String::new(),
+            y_label: String::new(),
+            x: Scale::linear(0.0, 1.0),
+            y: Scale::linear(0.0, 1.0),
+            cells: (3, 2),
+            values: vec![Some(1.0), Some(1.0), None, Some(f64::NAN), Some(-1.0), Some(1.0)],
+            map: ColorMap::Diverging,
+            range: (-1.0, 1.0),
+            color_label: String::new(),
+            width: 300.0,
+        };
+        let layers = map.layers();
+        assert_eq!(
+            layers,
+            [
+                (hex(ColorMap::Diverging.color(0.0)), "M1 1h1v1h-1z".to_owned()),
+                (hex(ColorMap::Diverging.color(1.0)), "M0 0h2v1h-2zM2 1h1v1h-1z".to_owned()),
+            ]
+        );
+    }
+}
