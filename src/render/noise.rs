@@ -72,8 +72,9 @@ pub(super) fn standard_errors(tile: Tile, pixels: &[Pixel]) -> Vec<DVec3> {
     pixels.iter().map(error).collect()
 }
 
-/// Squared errors of a pixel's channels against its radiance, summed; `mean` is the picture's.
-pub(super) fn relative_squares(squares: DVec3, radiance: DVec3, mean: f64) -> f64 {
+/// Squared errors of a pixel's channels against its radiance, summed; `mean` is the picture's. What [`PictureError`] is the root of the mean of.
+#[must_use]
+pub fn relative_squares(squares: DVec3, radiance: DVec3, mean: f64) -> f64 {
     let floor = (DARK * mean).powi(2).max(f64::MIN_POSITIVE);
     (squares / (radiance * radiance + floor)).element_sum()
 }
