@@ -34,9 +34,12 @@ fn help_lists_every_command() {
         "validate",
         "compare",
         "convert",
+        "tradeoff",
         "models",
         "scenes",
         "instruments",
+        "completions",
+        "man",
     ];
     for name in expected {
         assert!(found.iter().any(|f| f == name), "{name} is missing of {found:?}");

@@ -21,6 +21,8 @@ mod outputs;
 mod plan;
 mod real_files;
 mod scenes;
+mod shell;
 mod streams;
 mod threads;
 mod through;
+mod tradeoff;
