@@ -4,8 +4,8 @@ use clap::CommandFactory;
 use clap_complete::Shell;
 use serde_json::json;
 
+use super::Cli;
 use super::ui::Ui;
-use super::{Cli, failure::Failure};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -17,10 +17,9 @@ pub(super) struct Args {
     shell: Shell,
 }
 
-pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+pub(super) fn run(args: &Args, ui: &Ui) {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "goniofit", &mut script);
     let script = String::from_utf8_lossy(&script);
     ui.result(&script, &json!({ "shell": args.shell.to_string(), "script": script }));
-    Ok(())
 }

@@ -148,7 +148,10 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
         Command::Models(args) => models::run(&args, ui),
         Command::Scenes(args) => scenes::run(&args, ui),
         Command::Instruments(args) => instruments::run(&args, ui),
-        Command::Completions(args) => completions::run(&args, ui),
+        Command::Completions(args) => {
+            completions::run(&args, ui);
+            Ok(())
+        }
         Command::Man(args) => man::run(&args, ui),
     }
 }

@@ -137,7 +137,7 @@ impl<'a> Adviser<'a> {
 
     /// The size between two neighbours at which the wish is just met.
     fn between(&self, wish: &Wish) -> Option<Advice> {
-        let pairs = self.known.windows(2).filter_map(|pair| {
+        let mut pairs = self.known.windows(2).filter_map(|pair| {
             let [a, b] = [&pair[0], &pair[1]];
             let (x, y) = (a.point.size?.ln(), b.point.size?.ln());
             let (p, q, want) = (bound(a, wish)?.ln(), bound(b, wish)?.ln(), limit(wish).ln());
@@ -145,7 +145,7 @@ impl<'a> Adviser<'a> {
             let crosses = if matches!(wish, Wish::Error(..)) { p > want && q <= want } else { p <= want && q > want };
             crosses.then(|| self.at((x + (y - x) * (want - p) / (q - p)).exp(), matches!(wish, Wish::Error(..))))?
         });
-        pairs.last()
+        pairs.next_back()
     }
 
     /// A size beyond the largest.

@@ -1,5 +1,7 @@
 //! A sweep as CSV: one row a setting.
 
+use std::fmt::Write as _;
+
 use super::curve::{Point, Sweep};
 use super::front::Standing;
 use crate::numeric::estimate::Estimate;
@@ -12,7 +14,7 @@ pub fn to_csv(sweep: &Sweep) -> String {
         sweep.stage, sweep.subject, sweep.trials, sweep.seed, sweep.threads
     );
     for said in &sweep.reference {
-        text.push_str(&format!("# reference: {said}\n"));
+        let _ = writeln!(text, "# reference: {said}");
     }
     let mut header: Vec<String> =
         ["curve", "setting", "axis", "size", "trials", "seconds", "seconds_low", "seconds_high", "instrument_s"]

@@ -203,11 +203,12 @@ fn stand<S>(series: &[Series], settings: &[Setting<S>], points: &mut [Option<Poi
         let point = points[i].as_ref().filter(|_| class(i) == (cost, main))?;
         point.cost(cost).zip(point.errors[main])
     };
-    let mut found = vec![Standing::Unknown; settings.len()];
-    for i in 0..settings.len() {
-        let rivals: Vec<_> = (0..settings.len()).map(|k| of(k, class(i))).collect();
-        found[i] = standings(&rivals)[i];
-    }
+    let found: Vec<Standing> = (0..settings.len())
+        .map(|i| {
+            let rivals: Vec<_> = (0..settings.len()).map(|k| of(k, class(i))).collect();
+            standings(&rivals)[i]
+        })
+        .collect();
     points.iter_mut().zip(found).for_each(|(point, found)| {
         if let Some(point) = point {
             point.standing = found;

@@ -42,24 +42,24 @@ pub(super) fn standings(points: &[Option<(Estimate, Estimate)>]) -> Vec<Standing
 
 #[cfg(test)]
 mod tests {
+    use super::Standing::{Beaten, Front, Undecided, Unknown};
     use super::*;
 
-    fn point(time: f64, error: f64, reach: f64) -> Option<(Estimate, Estimate)> {
-        let estimate = |value: f64| Estimate { value, low: value / reach, high: value * reach };
-        Some((estimate(time), estimate(error)))
+    fn point(time: f64, error: f64) -> (Estimate, Estimate) {
+        let estimate = |value: f64| Estimate { value, low: value / 1.1, high: value * 1.1 };
+        (estimate(time), estimate(error))
     }
 
     #[test]
     fn only_what_is_surely_worse_in_both_is_beaten() {
         let points = [
-            point(1.0, 8.0, 1.1),
-            point(2.0, 4.0, 1.1),
-            point(4.0, 9.0, 1.1), // later and worse than both
-            point(2.1, 4.1, 1.1), // within the intervals of the second
-            point(2.0, 3.9, 1.1), // as fast as the second, and better: which leaves the second open
+            Some(point(1.0, 8.0)),
+            Some(point(2.0, 4.0)),
+            Some(point(4.0, 9.0)), // later and worse than both
+            Some(point(2.1, 4.1)), // within the intervals of the second
+            Some(point(2.0, 3.9)), // as fast as the second, and better: which leaves the second open
             None,
         ];
-        use Standing::{Beaten, Front, Undecided, Unknown};
         assert_eq!(standings(&points), [Front, Undecided, Beaten, Undecided, Front, Unknown]);
     }
 }

@@ -44,7 +44,7 @@ fn kept(
         let met = |t: &&goniofit::tradeoff::Trial| match wish {
             Wish::Error(_, most) => t.errors[measure] <= *most,
             Wish::Time(most) => t.seconds <= *most,
-            _ => false,
+            Wish::InstrumentTime(_) => false,
         };
         kept.trials += point.trials.len();
         kept.met += point.trials.iter().filter(met).count();

@@ -48,9 +48,8 @@ pub(super) fn text(answers: &Answers, sweep: &Sweep) -> String {
 }
 
 fn one(asked: &Asked, found: &Result<Advice, NoAdvice>, sweep: &Sweep) -> String {
-    let advice = match found {
-        Ok(advice) => advice,
-        Err(_) => return format!("\n{}: none\n", asked.typed), // the command fails, and says why
+    let Ok(advice) = found else {
+        return format!("\n{}: none\n", asked.typed); // the command fails, and says why
     };
     let beyond = if advice.beyond { ", beyond what was measured" } else { "" };
     let instrument = advice.instrument_s.map_or(String::new(), |s| format!(" and {} of the instrument", time(s)));

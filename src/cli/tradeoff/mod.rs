@@ -96,13 +96,11 @@ impl Common {
         if let Some(why) = &sweep.ended {
             ui.warn(&format!("{why}: some settings have fewer than {} trials, or none", sweep.trials));
         }
-        match advice.iter().find_map(|(_, found)| found.as_ref().err()) {
-            Some(why) => Err(Failure::work(why.to_string()).beside(text, object)),
-            None => {
-                ui.result(&text, &object);
-                Ok(())
-            }
+        if let Some(why) = advice.iter().find_map(|(_, found)| found.as_ref().err()) {
+            return Err(Failure::work(why.to_string()).beside(text, object));
         }
+        ui.result(&text, &object);
+        Ok(())
     }
 }
 

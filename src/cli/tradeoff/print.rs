@@ -184,8 +184,7 @@ mod tests {
 
     #[test]
     fn words_fill_eighty_columns() {
-        let text =
-            filled(&"\n  twelve chars ".repeat(1).repeat(1).replace("twelve chars ", &"twelve chars ".repeat(12)), 4);
+        let text = filled(&format!("\n  {}", "twelve chars ".repeat(12)), 4);
         assert!(text.starts_with("\n  twelve") && text.lines().all(|l| l.chars().count() <= 80), "{text}");
         assert!(text.lines().skip(2).all(|l| l.starts_with("    ") && !l.starts_with("     ")), "{text}");
     }

@@ -51,9 +51,6 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ));
     }
     let on = |knob: &str| args.knobs.contains(&knob);
-    fn list<T: Clone>(on: bool, values: &[T]) -> Vec<T> {
-        if on { values.to_vec() } else { Vec::new() }
-    }
     let mut steps = list(on("step"), &args.steps);
     steps.sort_by(|a, b| b.total_cmp(a));
     let has_cones = plan.instrument.detector.aperture_deg + plan.instrument.source.divergence_deg > 0.0;
@@ -80,4 +77,9 @@ fn command(args: &Args, plan: &Plan) -> String {
     let spec = args.what.spec.as_ref().map_or(String::new(), |spec| format!(" {}", spec.display()));
     let instrument = args.what.instrument.as_ref().map_or(String::new(), |name| format!(" --instrument {name}"));
     format!("goniofit simulate{spec} --material {}{instrument} --scan {} --out OUT.csv", plan.material, plan.scan)
+}
+
+/// The values of a knob that is turned.
+fn list<T: Clone>(on: bool, values: &[T]) -> Vec<T> {
+    if on { values.to_vec() } else { Vec::new() }
 }

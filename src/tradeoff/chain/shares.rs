@@ -130,7 +130,7 @@ impl Known {
         });
         let mut nearest: [Option<Share>; 3] = [None, None, None];
         for step in steps {
-            let kind = if step.readings != own.readings { 0 } else { 1 + usize::from(step.stride == own.stride) };
+            let kind = if step.readings == own.readings { 1 + usize::from(step.stride == own.stride) } else { 0 };
             let nearer = |other: &Share| {
                 step.readings <= other.readings && step.stride >= other.stride && step.samples <= other.samples
             };

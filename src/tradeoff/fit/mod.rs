@@ -1,5 +1,6 @@
 //! What accuracy of a fit costs: how many samples it takes, the loss, the model.
 
+use std::fmt::Write as _;
 use std::time::Instant;
 
 use super::curve::{About, Sweep, curves};
@@ -131,7 +132,7 @@ fn design(
                 for &step in steps {
                     let size = (whole / step as f64).max(1.0);
                     let (part, stride) = if knob == Knob::Part { (step, 1) } else { (1, step) };
-                    let way = Way { options: FitOptions { part, stride, ..options.clone() }, model: m };
+                    let way = Way { options: FitOptions { stride, part, ..options.clone() }, model: m };
                     let text = typed(model, loss, what, &knob.typed(size, whole));
                     // What half a table says of the other half is one draw, whatever the seed.
                     let effective = if step < FEW { f64::INFINITY } else { 1.0 / (1.0 / size - 1.0 / whole) };
@@ -167,10 +168,10 @@ fn named(model: &ModelSpec, loss: Loss, with_loss: bool) -> String {
 fn typed(model: &ModelSpec, loss: Loss, what: &FitSweep, knob: &str) -> String {
     let mut text = String::new();
     if what.models.len() > 1 {
-        text.push_str(&format!("--model {model} "));
+        let _ = write!(text, "--model {model} ");
     }
     if what.losses.len() > 1 {
-        text.push_str(&format!("--loss {} ", loss.name()));
+        let _ = write!(text, "--loss {} ", loss.name());
     }
     text + knob
 }

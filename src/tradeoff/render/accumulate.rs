@@ -52,8 +52,7 @@ impl Truth {
             String::new()
         };
         format!(
-            "the mean of two pictures of {samples} samples a pixel by the scene's plan, off by {:.2e} by their difference, which is taken off{times}",
-            own
+            "the mean of two pictures of {samples} samples a pixel by the scene's plan, off by {own:.2e} by their difference, which is taken off{times}"
         )
     }
 }

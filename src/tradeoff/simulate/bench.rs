@@ -96,6 +96,16 @@ impl<'a> Bench<'a> {
         said
     }
 
+    /// What a reader must know.
+    pub fn notes(&self) -> Vec<String> {
+        let least = self.what.quadrature.iter().copied().fold(f64::INFINITY, f64::min);
+        let said = format!(
+            "some readings' orders end before {FINEST:.0e}: an error far below {:.0e} may be the reference's",
+            self.quadrature_error
+        );
+        (self.quadrature_error > least).then_some(said).into_iter().collect()
+    }
+
     pub fn trial(&mut self, read: &Read, turn: Turn) -> Result<Trial, ChainError> {
         match read {
             Read::Quadrature(accuracy) => self.quadrature(*accuracy, turn.round),

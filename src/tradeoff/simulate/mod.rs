@@ -73,7 +73,7 @@ pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) ->
         subject: format!("{} along {}", what.name, what.scan),
         command: format!("goniofit simulate --material {} --scan {}", what.name, what.scan),
         reference: bench.said(),
-        notes: Vec::new(),
+        notes: bench.notes(),
     };
     Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
 }
