@@ -38,7 +38,7 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     let b = Bench::new();
     b.paint("paint.csv");
     let args =
-        ["tradeoff", "fit", "paint.csv", "--parts", "1,7,14,28", "--targets", "1%", "--trials", "24", "--out", "t"];
+        ["tradeoff", "fit", "paint.csv", "--parts", "1,10,20,40", "--targets", "1%", "--trials", "24", "--out", "t"];
     let found = b.json(&args);
     let excess = errors(&found, "lambert+phong", "excess");
     assert_eq!(excess.last(), Some(&0.0), "the fit to all is the reference: {excess:?}");

@@ -116,7 +116,7 @@ pub fn render_with(scene: &str, sweeps: u64, trials: u32, side: u32, wish: &Wish
         trials,
         wish,
         |seed| sweep(vec![8, 16, 32, 64, 128, 256], 1024, effort(6, seed)),
-        |advice, e| sweep(vec![advice.size.expect("a size") as u32], 4096, e),
+        |advice, e| sweep(vec![advice.size.expect("a size") as u32], 1024, e),
     )
 }
 

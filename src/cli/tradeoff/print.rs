@@ -64,7 +64,9 @@ fn table(sweep: &Sweep, curve: &Curve) -> String {
         text.push_str(&filled(&format!("  kept: {} at most {}", curve.main, kept.join(", ")), 4));
     }
     let mut said: Vec<&str> = Vec::new();
-    for slope in curve.slopes.iter().filter(|s| s.law.is_some() || s.slope.low * s.slope.high > 0.0) {
+    // One that may as well be anything says nothing.
+    let told = |s: &&Slope| s.slope.high - s.slope.low < 2.0 && (s.law.is_some() || s.slope.low * s.slope.high > 0.0);
+    for slope in curve.slopes.iter().filter(told) {
         let why = slope.law.map(|law| law.why).filter(|why| !said.contains(why));
         said.extend(why);
         text.push_str(&filled(&slope_said(curve, slope, why), 4));
@@ -79,7 +81,7 @@ fn line(text: &mut String, curve: &Curve, point: &Point, main: usize, others: &[
         Standing::Beaten | Standing::Unknown => ' ',
     };
     let setting = &point.setting;
-    if setting.chars().count() > first {
+    if setting.chars().count() >= first {
         let _ = writeln!(text, "{mark} {setting}");
         let _ = write!(text, "{:w$}", "", w = first + 2);
     } else {

@@ -29,7 +29,7 @@ pub(super) enum Try {
 }
 
 /// Samples of pictures that share their noise.
-const SHARED: u32 = 32;
+const SHARED: u32 = 128;
 /// Times the most samples that half of the reference has.
 const BETTER: u32 = 4;
 

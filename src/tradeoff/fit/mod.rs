@@ -40,7 +40,7 @@ const MEASURES: [Measure; 3] = [
         name: "parameters",
         what: "root mean square of relative changes of weights and shapes against the fit to all samples",
     },
-    Measure { name: "image", what: "relative error of a ball's picture against that of the fit to all samples" },
+    Measure { name: "image", what: "relative error of a ball's picture against that of the best fit to all samples" },
 ];
 
 const SQUARED: Law = Law {
@@ -52,8 +52,8 @@ const SCATTER: Law = Law {
     why: "independent samples; of a part of n out of N by the root of 1/n − 1/N",
 };
 
-/// Of steps below this there are too few parts alike to tell a slope by.
-const FEW: usize = 5;
+/// Of steps below this there are too few parts alike to tell a slope by: a table has no more of them than the step, however often one tries.
+const FEW: usize = 10;
 
 /// One way to fit.
 struct Way {
@@ -119,7 +119,7 @@ fn design(
             let laws = vec![
                 Some(SQUARED).filter(|_| is_best),
                 Some(SCATTER).filter(|_| loss == own_loss),
-                Some(SCATTER).filter(|_| loss == own_loss),
+                Some(SCATTER).filter(|_| is_best),
             ];
             let options = FitOptions { model: model.clone(), loss, ..what.options.clone() };
             let name = named(model, loss, losses.len() > 1);
@@ -134,7 +134,6 @@ fn design(
                     let (part, stride) = if knob == Knob::Part { (step, 1) } else { (1, step) };
                     let way = Way { options: FitOptions { stride, part, ..options.clone() }, model: m };
                     let text = typed(model, loss, what, &knob.typed(size, whole));
-                    // What half a table says of the other half is one draw, whatever the seed.
                     let effective = if step < FEW { f64::INFINITY } else { 1.0 / (1.0 / size - 1.0 / whole) };
                     let setting = Setting::sized(series.len() - 1, size, text, way);
                     settings.push(Setting { effective: Some(effective), ..setting });

@@ -68,7 +68,8 @@ impl<'a> Yardstick<'a> {
         let whole = &self.whole[model];
         // The fit to all samples is its own reference: what rounding leaves is no error.
         let excess = (self.rmse(fitted)? / self.best - 1.0).max(0.0);
-        let off = picture(self.measurement, fitted).zip(whole.picture.as_ref()).map(|(own, all)| own.off_by(all));
+        let best = self.whole.iter().find(|w| w.rmse <= self.best).and_then(|w| w.picture.as_ref());
+        let off = picture(self.measurement, fitted).zip(best).map(|(own, all)| own.off_by(all));
         let parameters = parameter_error(fitted, &whole.material);
         let is_rounding = excess < 1e-12 && parameters < 1e-6;
         let errors = vec![excess, parameters, off.unwrap_or(f64::NAN)];
