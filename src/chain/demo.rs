@@ -34,11 +34,13 @@ pub struct DemoOptions {
     pub seed: u64,
     /// What measures, and what it is called; a noisy detector alone where there is none.
     pub instrument: Option<(String, Instrument)>,
+    /// How the run was asked for, to stand in `numbers.json`.
+    pub run: Option<serde_json::Value>,
 }
 
 impl Default for DemoOptions {
     fn default() -> Self {
-        Self { size: 360, samples: 144, seed: 1, instrument: None }
+        Self { size: 360, samples: 144, seed: 1, instrument: None, run: None }
     }
 }
 
@@ -70,6 +72,8 @@ pub struct Demo {
     pub times: Vec<(String, f64)>,
     /// Whether the work was stopped before its end.
     pub stopped: bool,
+    /// How the run was asked for.
+    pub run: Option<serde_json::Value>,
 }
 
 const MATERIAL: &str = "glossy-paint";
@@ -180,7 +184,16 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
         .map(|(label, material)| DemoFit { label, material, image: images.next().flatten() })
         .collect();
     let stopped = control.stop.requested();
-    let demo = Demo { truth, name: MATERIAL, pairs: table.len(), instrument: name, fits, times, stopped };
+    let demo = Demo {
+        truth,
+        name: MATERIAL,
+        pairs: table.len(),
+        instrument: name,
+        fits,
+        times,
+        stopped,
+        run: options.run.clone(),
+    };
     write_numbers(&folder.join("numbers.json"), &demo)?;
     Ok(demo)
 }
@@ -202,7 +215,7 @@ impl Demo {
     pub fn numbers(&self) -> serde_json::Value {
         let file = |m: &Material| m.to_json().ok().and_then(|t| serde_json::from_str::<serde_json::Value>(&t).ok());
         let fit = |f: &DemoFit| json!({ "label": f.label, "material": file(&f.material), "image": f.image });
-        json!({
+        let mut object = json!({
             "material": self.name,
             "pairs": self.pairs,
             "instrument": self.instrument,
@@ -210,7 +223,11 @@ impl Demo {
             "fits": self.fits.iter().map(fit).collect::<Vec<_>>(),
             "seconds": self.times,
             "stopped": self.stopped,
-        })
+        });
+        if let Some(run) = &self.run {
+            object["run"] = run.clone();
+        }
+        object
     }
 }
 

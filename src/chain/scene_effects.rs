@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::error::ChainError;
 use super::pictures::{Stage, scene_of};
+use super::source::{Source, render_material};
 use crate::brdf::Reflectance;
 use crate::control::Control;
 use crate::render::scene::LightsSpec;
@@ -42,6 +43,16 @@ pub struct SceneEffects {
     pub full_off_by: f64,
     /// How far two pictures are off each other that differ by their noise alone: less than this, `off_by` says nothing.
     pub noise: f64,
+}
+
+/// Which effects a stage calls for with a material in the place of its replaceable one, and because of what. Nothing is rendered.
+///
+/// # Errors
+/// [`ChainError`] where the material can't be shown, or the scene can't be built.
+pub fn scene_plan(stage: &Stage, subject: &crate::brdf::Material) -> Result<crate::control::Plan, ChainError> {
+    let subject = render_material("the material", &Source::Fitted(Box::new(subject.clone())), None)?;
+    let (scene, _) = scene_of(stage, Some(subject))?;
+    Ok(Plan::of(&scene).effects(&scene))
 }
 
 /// Renders the stage with all effects that it calls for and without each.

@@ -7,14 +7,16 @@ use super::failure::Failure;
 use super::fit::plus_minus;
 use super::instrument::read_instrument;
 use super::output::make_folder;
+use super::report;
 use super::ui::{self, Ui};
 use crate::brdf::PerChannel;
 use crate::chain::{Demo, DemoFit, DemoOptions, demo};
 use crate::image::Comparison;
+use crate::report::run::RunOptions;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  goniofit demo --out my-demo\n  goniofit demo --instrument commercial --out lab-demo"
+    after_help = "Examples:\n  goniofit demo --out my-demo --report\n  goniofit demo --instrument commercial --out lab-demo"
 )]
 pub(super) struct Args {
     /// Folder to write to
@@ -33,6 +35,9 @@ pub(super) struct Args {
     /// Samples per pixel
     #[arg(long, default_value_t = DemoOptions::default().samples, value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
     samples: u32,
+    /// Also write report.html, the run on one page
+    #[arg(long)]
+    report: bool,
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
@@ -41,14 +46,21 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         Some(name) => Some((name.clone(), read_instrument(name)?)),
         None => None,
     };
-    let options = DemoOptions { size: args.size, samples: args.samples, seed: args.seed, instrument };
+    let options =
+        DemoOptions { size: args.size, samples: args.samples, seed: args.seed, instrument, run: Some(report::made()) };
     let demo = demo(&args.out, &options, ui.control())?;
     if ui::stop().requested() {
         ui.warn("stopped: pictures are missing or have fewer samples than asked for");
     }
     let mut object = demo.numbers();
     object["out"] = serde_json::json!(args.out);
-    ui.result(&(describe(&demo) + &format!("\nWritten to {}: look at sheet.png\n", args.out.display())), &object);
+    let mut look = "sheet.png".to_owned();
+    if args.report {
+        let page = report::of_folder(&args.out, &RunOptions::default())?;
+        object["report"] = serde_json::json!(page);
+        look += " and report.html";
+    }
+    ui.result(&(describe(&demo) + &format!("\nWritten to {}: look at {look}\n", args.out.display())), &object);
     Ok(())
 }
 

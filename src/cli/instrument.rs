@@ -1,9 +1,12 @@
 //! What `--instrument` names: a built-in instrument, or a simulation file.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::failure::Failure;
 use super::output::{input_name, read_text};
+use crate::brdf::Sight;
+use crate::gonio::sight::Cones;
 use crate::gonio::{self, Instrument, PRESETS, Preset, SimulationSpec};
 
 /// The built-in instrument of this name, else the `[instrument]` of this simulation file (`-` is stdin).
@@ -21,6 +24,17 @@ pub(super) fn read_instrument(text: &str) -> Result<Instrument, Failure> {
         Some(instrument) => Ok(instrument),
         None if is_table(&text) => Err(Failure::usage(format!("{}: {TABLE}", input_name(path)))),
         None => Ok(spec_of(path, &text)?.instrument),
+    }
+}
+
+/// What lobes are seen through by this instrument; one of points is refused.
+pub(super) fn read_sight(name: &str) -> Result<Arc<dyn Sight>, Failure> {
+    match Cones::of(&read_instrument(name)?) {
+        Some(cones) => Ok(Arc::new(cones)),
+        None => Err(Failure::usage(format!(
+            "--through {name}: expected an instrument with an aperture (instrument.detector.aperture_deg) or a divergence \
+             (instrument.source.divergence_deg), found points, through which a fit is the plain one"
+        ))),
     }
 }
 

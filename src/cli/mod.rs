@@ -19,8 +19,10 @@ mod man;
 mod models;
 mod output;
 mod plan;
+mod plot;
 mod reduce;
 mod render;
+mod report;
 mod scenes;
 mod simulate;
 mod simulation;
@@ -85,6 +87,10 @@ enum Command {
     Validate(validate::Args),
     /// Compare two pictures
     Compare(compare::Args),
+    /// Put a run on one HTML page: measurement, fits, pictures, numbers
+    Report(report::Args),
+    /// Draw a figure as SVG or PNG: lobes, slices, residuals, coverage
+    Plot(plot::Args),
     /// Convert between measurement formats, or sample a fit onto a grid
     Convert(convert::Args),
     /// Say what accuracy costs in time, and which setting a wanted error or time takes
@@ -143,6 +149,8 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
         Command::Render(args) => render::run(&args, ui),
         Command::Validate(args) => validate::run(&args, ui),
         Command::Compare(args) => compare::run(&args, ui),
+        Command::Report(args) => report::run(&args, ui),
+        Command::Plot(args) => plot::run(&args, ui),
         Command::Convert(args) => convert::run(&args, ui),
         Command::Tradeoff(args) => tradeoff::run(&args, ui),
         Command::Models(args) => models::run(&args, ui),

@@ -10,12 +10,14 @@ use super::failure::Failure;
 use super::info::Reading;
 use super::output::{keeps_inputs, make_folder, write_text};
 use super::render::{PictureArgs, parse_exposure};
+use super::report;
 use super::ui::{self, Ui};
 use crate::brdf::Material;
 use crate::chain::{self, ChainError, Shown, Source, Stage};
 use crate::image::{Appearance, Comparison};
 use crate::measurement::{Dimension, Measurement, MeasurementError, formats};
 use crate::render::{Material as Subject, Options};
+use crate::report::run::RunOptions;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  goniofit validate gold.binary gold.json --scene sphere-on-plane --out gold/")]
@@ -33,6 +35,9 @@ pub(super) struct Args {
     /// Folder to write to: table.exr, fit-1.exr, difference-1.exr, maps-1.png …, previews, sheet.png, numbers.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Also write report.html, the run on one page
+    #[arg(long)]
+    report: bool,
     #[command(flatten)]
     reading: Reading,
 }
@@ -82,9 +87,14 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         "measurement": args.measurement, "scene": stage.spec.name, "samples": options.samples, "seed": options.seed,
         "exposure": gallery.exposure, "reference": format!("{}.exr", reference.file), "table_not_rendered": missing,
         "fits": rows.iter().enumerate().map(numbers).collect::<Vec<_>>(), "out": args.out, "stopped": stopped,
+        "run": report::made(),
     });
     let numbers = serde_json::to_string_pretty(&object).map_err(|e| Failure::work(e.to_string()))?;
     write_text(&args.out.join("numbers.json"), &(numbers + "\n"))?;
+    if args.report {
+        let options = RunOptions { measurement: Some(args.measurement.clone()), reading: args.reading.options() };
+        report::of_folder(&args.out, &options)?;
+    }
     let head = format!("{name}, {} scene, {} samples a pixel\n", stage.spec.name, options.samples);
     for note in rows.iter().filter_map(|(_, c)| c.and_then(|c| c.note.as_ref())) {
         ui.warn(note);

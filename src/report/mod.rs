@@ -4,4 +4,10 @@
 //! no other file. The one decision to know: every figure is drawn here, as SVG, and a page's script only moves what is already drawn, so a page
 //! without scripts, or on paper, still shows it.
 
+mod page;
 pub mod plot;
+pub mod run;
+pub mod views;
+mod words;
+
+pub use page::{Written, page};

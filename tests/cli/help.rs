@@ -33,6 +33,8 @@ fn help_lists_every_command() {
         "render",
         "validate",
         "compare",
+        "plot",
+        "report",
         "convert",
         "tradeoff",
         "models",

@@ -85,6 +85,9 @@ pub(in crate::cli) struct Args {
     /// Folder to write the fits of several measurements to, each under its own name
     #[arg(long, value_name = "D", help_heading = OUTPUT)]
     pub out_dir: Option<PathBuf>,
+    /// Also write a page about each fit beside it, FIT.html for FIT.json
+    #[arg(long, help_heading = OUTPUT)]
+    pub report: bool,
     /// Print every step of the search on stderr
     #[arg(long, help_heading = OUTPUT)]
     pub log: bool,

@@ -1,15 +1,14 @@
 //! From what was typed to a plan: the options of the fit, and where each result goes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::args::{Args, Wanted};
 use crate::brdf::{Sight, SpecError};
 use crate::cli::failure::Failure;
-use crate::cli::instrument::read_instrument;
+use crate::cli::instrument::read_sight;
 use crate::cli::output::keeps_inputs;
 use crate::fit::{Bootstrap, FitOptions, Limit};
-use crate::gonio::sight::Cones;
 
 impl Args {
     /// The fit's options.
@@ -46,15 +45,7 @@ impl Args {
 
     /// What lobes are seen through.
     fn sight(&self) -> Result<Option<Arc<dyn Sight>>, Failure> {
-        let Some(name) = &self.through else { return Ok(None) };
-        let instrument = read_instrument(name)?;
-        match Cones::of(&instrument) {
-            Some(cones) => Ok(Some(Arc::new(cones))),
-            None => Err(Failure::usage(format!(
-                "--through {name}: expected an instrument with an aperture (instrument.detector.aperture_deg) or a divergence \
-                 (instrument.source.divergence_deg), found points, through which a fit is the plain one"
-            ))),
-        }
+        self.through.as_deref().map(read_sight).transpose()
     }
 
     /// The option that limit `i` of all was typed with.
@@ -66,9 +57,18 @@ impl Args {
 /// Where each fit goes, checked before anything is read: no fit goes where a measurement or another fit is.
 pub(super) fn targets(args: &Args) -> Result<Vec<Option<PathBuf>>, Failure> {
     let targets = named_targets(args)?;
+    if args.report && targets.iter().any(|t| t.as_deref().is_none_or(|t| t == Path::new("-"))) {
+        return Err(Failure::usage(
+            "--report: expected --out FIT.json or --out-dir D, beside which the page is written",
+        ));
+    }
     let option = if args.out_dir.is_some() { "--out-dir" } else { "--out" };
     for target in targets.iter().flatten() {
-        keeps_inputs(option, target, args.files.iter().map(PathBuf::as_path))?;
+        let inputs = || args.files.iter().map(PathBuf::as_path);
+        keeps_inputs(option, target, inputs())?;
+        if args.report {
+            keeps_inputs("--report", &target.with_extension("html"), inputs())?;
+        }
     }
     Ok(targets)
 }

@@ -9,9 +9,11 @@ use super::plan::targets;
 use super::print::describe;
 use crate::cli::failure::Failure;
 use crate::cli::output::{check_folder, make_folder, write_text};
+use crate::cli::report;
 use crate::cli::ui::{self, Ui};
 use crate::fit::{FitError, FitOptions, Fitted, fit, fit_best_model};
 use crate::measurement::{Measurement, formats};
+use crate::report::run::Run;
 
 /// Fits file by file.
 pub(in crate::cli) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
@@ -43,7 +45,7 @@ pub(in crate::cli) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
                 Some(Ok(read)) => read.map_err(Failure::from),
                 _ => Err(Failure::work(format!("{}: the reader failed", file.display()))),
             };
-            match table.and_then(|table| one(args, &options, file, &table, target.as_deref(), ui)) {
+            match table.and_then(|table| one(args, &options, file, table, target.as_deref(), ui)) {
                 Ok((said, object)) => {
                     ui.has_something_to_keep();
                     text.push_str(&said);
@@ -82,7 +84,7 @@ fn one(
     args: &Args,
     options: &FitOptions,
     file: &Path,
-    table: &Measurement,
+    table: Measurement,
     target: Option<&Path>,
     ui: &Ui,
 ) -> Result<(String, Value), Failure> {
@@ -90,8 +92,8 @@ fn one(
         ui.note(&format!("{}: note: {note}", file.display()));
     }
     let fitted = match args.model {
-        Wanted::Auto => fit_best_model(table, options),
-        Wanted::Model(_) => fit(table, options),
+        Wanted::Auto => fit_best_model(&table, options),
+        Wanted::Model(_) => fit(&table, options),
     };
     let fitted = fitted.map_err(|error| refused(args, file, error))?;
     if args.log {
@@ -101,9 +103,19 @@ fn one(
     if let Some(target) = target {
         write_text(target, &(text.clone() + "\n"))?;
     }
+    let page = if args.report { target.map(|t| t.with_extension("html")) } else { None };
+    if let (Some(page), Some(target)) = (&page, target) {
+        let through = options.through.clone();
+        let run =
+            Run::of_fit(file, table, &target.display().to_string(), &fitted.material, through, report::this_run());
+        report::write(&run, page)?;
+    }
     let mut object: Value = serde_json::from_str(&text).map_err(|e| Failure::work(e.to_string()))?;
     object["file"] = json!(file);
     object["out"] = json!(target);
+    if let Some(page) = page {
+        object["report"] = json!(page);
+    }
     object["history"] = json!(history(&fitted));
     let said = describe(&file.display().to_string(), &fitted.material)
         + &target.map_or(String::new(), |t| format!("  written to {}\n", t.display()));

@@ -28,17 +28,27 @@ pub(in crate::report) enum Mark {
         class: String,
         x: Px,
         y: Px,
-        turned: bool,
         spans: Vec<Span>,
     },
-    /// Cells of a grid in units of one cell, one path a colour; `transform` puts them in place.
+    /// Coloured areas: colour and path data.
     Cells {
-        transform: String,
         layers: Vec<(String, String)>,
     },
     /// What follows up to [`Mark::End`] belongs together.
     Begin {
         class: String,
+    },
+    /// What follows up to [`Mark::End`] belongs together and is turned by an angle (degrees, with the clock) about a point.
+    Turn {
+        class: String,
+        degrees: Px,
+        x: Px,
+        y: Px,
+    },
+    /// What follows up to [`Mark::End`] is drawn this far to the right and down.
+    Shift {
+        x: Px,
+        y: Px,
     },
     End,
 }
@@ -123,12 +133,14 @@ impl Canvas {
 
     /// `class` carries the anchor: `start`, `middle` or `end`.
     pub fn text(&mut self, class: &str, (x, y): (f64, f64), text: &str) {
-        self.marks.push(Mark::Text { class: class.into(), x: Px(x), y: Px(y), turned: false, spans: spans(text) });
+        self.marks.push(Mark::Text { class: class.into(), x: Px(x), y: Px(y), spans: spans(text) });
     }
 
-    /// Text that reads upwards.
-    pub fn turned_text(&mut self, class: &str, (x, y): (f64, f64), text: &str) {
-        self.marks.push(Mark::Text { class: class.into(), x: Px(x), y: Px(y), turned: true, spans: spans(text) });
+    /// Another canvas, its corner at (x, y).
+    pub fn place(&mut self, other: &Self, (x, y): (f64, f64)) {
+        self.marks.push(Mark::Shift { x: Px(x), y: Px(y) });
+        self.marks.extend(other.marks.iter().cloned());
+        self.marks.push(Mark::End);
     }
 
     pub fn group(&mut self, class: &str, fill: impl FnOnce(&mut Self)) {

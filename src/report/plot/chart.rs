@@ -1,10 +1,10 @@
 //! A chart of lines and points over two straight axes.
 
 use super::Figure;
-use super::axes::{Area, Axis, text_width};
+use super::axes::{Area, Axis};
 use super::canvas::{Canvas, line};
+use super::legend::{dot_class, draw_legend, legend_rows, line_class, wrapped};
 use super::scale::Scale;
-use super::style::{COLORS, REFERENCE};
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -100,28 +100,9 @@ impl Default for Chart {
             series: Vec::new(),
             bars: true,
             legend: LegendPlace::Below,
-            size: (480.0, 330.0),
+            size: (430.0, 330.0),
         }
     }
-}
-
-/// The number of a colour that there is; those of models come again after the last.
-fn wrapped(color: usize) -> usize {
-    if color == 0 { 0 } else { 1 + (color - 1) % (COLORS - 1) }
-}
-
-/// The class of a series' lines: colour and dash.
-pub(in crate::report) fn line_class(color: usize) -> String {
-    match (color, wrapped(color)) {
-        (REFERENCE, _) => "ref".into(),
-        (_, c @ 0..2) => format!("line s{c}"),
-        (_, c) => format!("line s{c} dash-{c}"),
-    }
-}
-
-/// The class of a series' dots.
-pub(in crate::report) fn dot_class(color: usize) -> String {
-    format!("dot f{}", wrapped(color))
 }
 
 impl Chart {
@@ -132,21 +113,20 @@ impl Chart {
         let top = if self.titled { 52.0 } else { 30.0 };
         let area = Area { left: 54.0, top, width: width - 54.0 - 16.0, height: height - top - 46.0 };
         let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), s.marks, s.color)).collect();
-        let rows = if self.legend == LegendPlace::Below { legend_rows(&names, width - 40.0) } else { Vec::new() };
+        let rows = if self.legend == LegendPlace::Below { legend_rows(&names, width - 20.0) } else { Vec::new() };
         let mut canvas = Canvas::new(width, height + 18.0 * rows.len() as f64);
         if self.titled {
             canvas.text("head", (10.0, 20.0), &self.title);
         }
         let axis = |label, scale, labels| Axis { label, scale, labels };
-        let across = (area.width / 62.0) as usize;
+        let across = (area.width / 64.0) as usize;
         area.frame(&mut canvas, &axis(&self.x_label, self.x, across), &axis(&self.y_label, self.y, 6), true);
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, &area, s)));
         draw_legend(&mut canvas, &rows, 10.0, height + 8.0);
-        let scale = |s: Scale| format!("{} {} {}", s.low, s.high, if s.log { "log" } else { "linear" });
         Figure::new(canvas, &self.title, &self.description)
             .with_data("area", area.data())
-            .with_data("x", scale(self.x))
-            .with_data("y", scale(self.y))
+            .with_data("x", self.x.data())
+            .with_data("y", self.y.data())
     }
 
     fn draw(&self, canvas: &mut Canvas, area: &Area, series: &Series) {
@@ -229,48 +209,6 @@ fn clipped(from: (f64, f64), to: (f64, f64)) -> Option<((f64, f64), (f64, f64))>
         _ => (from.0 + t * dx, from.1 + t * dy),
     };
     (begin <= end).then(|| (at(begin), at(end)))
-}
-
-/// A name in a legend, with its sample's place in its row.
-pub(in crate::report) type Entry<'a> = (f64, &'a str, Marks, usize);
-
-/// Names in as many rows as they need.
-pub(in crate::report) fn legend_rows<'a>(names: &[(&'a str, Marks, usize)], width: f64) -> Vec<Vec<Entry<'a>>> {
-    let (mut rows, mut x) = (vec![Vec::new()], 0.0);
-    for &(name, marks, color) in names.iter().filter(|(name, ..)| !name.is_empty()) {
-        let needed = 30.0 + text_width(name, 12.0) + 18.0;
-        if x > 0.0 && x + needed > width {
-            rows.push(Vec::new());
-            x = 0.0;
-        }
-        if let Some(row) = rows.last_mut() {
-            row.push((x, name, marks, color));
-        }
-        x += needed;
-    }
-    rows.retain(|row| !row.is_empty());
-    rows
-}
-
-pub(in crate::report) fn draw_legend(canvas: &mut Canvas, rows: &[Vec<Entry<'_>>], left: f64, top: f64) {
-    if rows.is_empty() {
-        return;
-    }
-    canvas.group("legend", |c| {
-        for (k, row) in rows.iter().enumerate() {
-            let y = top + 18.0 * k as f64;
-            for &(x, name, marks, color) in row {
-                let x = left + x;
-                if marks != Marks::Dots {
-                    c.segment(&line_class(color), (x, y - 4.0), (x + 24.0, y - 4.0));
-                }
-                if marks != Marks::Line {
-                    c.circle(&dot_class(color), (x + 12.0, y - 4.0), 3.0);
-                }
-                c.text("", (x + 31.0, y), name);
-            }
-        }
-    });
 }
 
 #[cfg(test)]

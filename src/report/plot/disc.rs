@@ -6,6 +6,7 @@ use std::fmt::Write;
 use super::Figure;
 use super::canvas::{Canvas, Mark, short};
 use super::heat::{color_bar, hex};
+use super::scale::Scale;
 use crate::image::ColorMap;
 
 /// A cell of the hemisphere, from θ and φ to θ and φ, degrees.
@@ -30,8 +31,8 @@ pub struct Disc {
     pub titled: bool,
     /// The cells that there is something to show of.
     pub cells: Vec<DiscCell>,
-    /// What the ends of the colours stand for.
-    pub range: (f64, f64),
+    /// What the colours stand for.
+    pub scale: Scale,
     /// What the colours stand for.
     pub color_label: String,
     /// Polar angles of incidence, degrees; drawn as ticks on the left.
@@ -45,28 +46,27 @@ impl Disc {
     #[must_use]
     pub fn figure(&self) -> Figure {
         let top = if self.titled { 52.0 } else { 30.0 };
-        let radius = 0.5 * (self.width - 20.0 - 110.0);
-        let center = (20.0 + radius, top + radius);
+        let radius = 0.5 * (self.width - 36.0 - 110.0);
+        let center = (36.0 + radius, top + radius);
         let mut canvas = Canvas::new(self.width, top + 2.0 * radius + 30.0);
         if self.titled {
             canvas.text("head", (10.0, 20.0), &self.title);
         }
         let layers = self.cells.iter().map(|cell| (self.color(cell.value), outline(center, radius, cell)));
-        canvas.marks.push(Mark::Cells { transform: "translate(0 0)".into(), layers: layers.collect() });
+        canvas.marks.push(Mark::Cells { layers: layers.collect() });
         frame(&mut canvas, center, radius);
         for theta in &self.incidences_deg {
             let r = radius * projected(*theta);
-            canvas.circle("head-of-ray", (center.0 - r, center.1), 2.4);
+            canvas.circle("incidence", (center.0 - r, center.1), 2.8);
         }
         let bar = (center.0 + radius + 30.0, top, 2.0 * radius);
-        color_bar(&mut canvas, ColorMap::Sequential, self.range, &self.color_label, bar);
+        color_bar(&mut canvas, ColorMap::Sequential, self.scale, &self.color_label, bar);
         Figure::new(canvas, &self.title, &self.description)
             .with_data("disc", format!("{} {} {radius}", center.0, center.1))
     }
 
     fn color(&self, value: f64) -> String {
-        let place = (value - self.range.0) / (self.range.1 - self.range.0).max(f64::MIN_POSITIVE);
-        hex(ColorMap::Sequential.color(place))
+        hex(ColorMap::Sequential.color(self.scale.place(value).unwrap_or(0.0)))
     }
 }
 
@@ -81,7 +81,7 @@ fn frame(canvas: &mut Canvas, center: (f64, f64), radius: f64) {
             let r = radius * projected(theta);
             c.path("zero", ring(center, r));
             let along = r * FRAC_1_SQRT_2;
-            c.text("tick", (center.0 + along + 2.0, center.1 + along + 10.0), &format!("{theta}°"));
+            c.text("tick halo", (center.0 + along + 2.0, center.1 + along + 10.0), &format!("{theta}°"));
         }
         c.path("axis", ring(center, radius));
         for (x, y, class, text) in [
@@ -111,6 +111,9 @@ fn outline(center: (f64, f64), radius: f64, cell: &DiscCell) -> String {
     };
     let (inner, outer) = cell.theta_deg;
     let (from, to) = cell.phi_deg;
+    if inner == 0.0 && to - from >= 360.0 {
+        return ring(center, radius * projected(outer));
+    }
     let mut d = String::new();
     let point = |(x, y): (f64, f64)| format!("{} {}", short(x), short(y));
     let arc = |theta: f64, sweep: u8, phi: f64| {

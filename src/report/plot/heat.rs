@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::Figure;
 use super::axes::{Area, Axis};
 use super::canvas::{Canvas, Mark, short};
-use super::scale::{Scale, minus, power_label};
+use super::scale::Scale;
 use crate::image::ColorMap;
 
 /// A map of values over two axes.
@@ -21,12 +21,14 @@ pub struct HeatMap {
     pub x_label: String,
     /// Label of the vertical axis.
     pub y_label: String,
-    /// The horizontal scale, linear.
+    /// The horizontal scale.
     pub x: Scale,
-    /// The vertical scale, linear.
+    /// The vertical scale.
     pub y: Scale,
-    /// Number of columns and rows.
-    pub cells: (usize, usize),
+    /// Borders of the columns, rising.
+    pub x_borders: Vec<f64>,
+    /// Borders of the rows, rising.
+    pub y_borders: Vec<f64>,
     /// Values, row by row from the bottom, each from the left; `None` is left empty.
     pub values: Vec<Option<f64>>,
     /// Colours.
@@ -53,12 +55,7 @@ impl HeatMap {
         if self.titled {
             canvas.text("head", (10.0, 20.0), &self.title);
         }
-        let layers = self.layers();
-        let (columns, rows) = self.cells;
-        let (sx, sy) = (side / columns as f64, side / rows as f64);
-        let transform = format!("translate({} {}) scale({sx} {})", short(area.left), short(area.bottom()), -sy);
-        let cells = Mark::Cells { transform, layers };
-        canvas.marks.push(cells);
+        canvas.marks.push(Mark::Cells { layers: self.layers(&area) });
         let x = Axis { label: &self.x_label, scale: self.x, labels: 4 };
         let y = Axis { label: &self.y_label, scale: self.y, labels: 5 };
         area.frame(&mut canvas, &x, &y, false);
@@ -72,8 +69,10 @@ impl HeatMap {
     }
 
     /// One path a colour, runs of cells of a row as one rectangle.
-    fn layers(&self) -> Vec<(String, String)> {
-        let columns = self.cells.0.max(1);
+    fn layers(&self, area: &Area) -> Vec<(String, String)> {
+        let columns = self.x_borders.len().max(2) - 1;
+        let x: Vec<f64> = self.x_borders.iter().filter_map(|b| self.x.place(*b).map(|p| area.x(p))).collect();
+        let y: Vec<f64> = self.y_borders.iter().filter_map(|b| self.y.place(*b).map(|p| area.y(p))).collect();
         let mut paths = vec![String::new(); LEVELS];
         for (row, values) in self.values.chunks(columns).enumerate() {
             let levels: Vec<Option<usize>> =
@@ -82,7 +81,8 @@ impl HeatMap {
             for run in levels.chunk_by(|a, b| a == b) {
                 if let Some(level) = run[0] {
                     // Writing to a String can't fail.
-                    let _ = write!(paths[level], "M{from} {row}h{0}v1h-{0}z", run.len());
+                    let (left, right) = (short(x[from]), short(x[from + run.len()]));
+                    let _ = write!(paths[level], "M{left} {}H{right}V{}H{left}z", short(y[row]), short(y[row + 1]));
                 }
                 from += run.len();
             }
@@ -93,7 +93,13 @@ impl HeatMap {
 
     /// The scale of colours, on the right.
     fn bar(&self, canvas: &mut Canvas, area: &Area) {
-        color_bar(canvas, self.map, self.range, &self.color_label, (area.right() + 18.0, area.top, area.height));
+        color_bar(
+            canvas,
+            self.map,
+            Scale::linear(self.range.0, self.range.1),
+            &self.color_label,
+            (area.right() + 18.0, area.top, area.height),
+        );
     }
 }
 
@@ -101,31 +107,25 @@ impl HeatMap {
 pub(in crate::report) fn color_bar(
     canvas: &mut Canvas,
     map: ColorMap,
-    (low, high): (f64, f64),
+    scale: Scale,
     label: &str,
     (left, top, height): (f64, f64, f64),
 ) {
     const STEPS: usize = 60;
     let layers = (0..STEPS).map(|k| {
         let color = hex(map.color((k as f64 + 0.5) / STEPS as f64));
-        (color, format!("M0 {k}h1v1.05h-1z"))
+        let y = |k: usize| short(top + height * (1.0 - k as f64 / STEPS as f64));
+        let (left, right) = (short(left), short(left + 12.0));
+        (color, format!("M{left} {}H{right}V{}H{left}z", y(k), y(k + 1)))
     });
-    let transform = format!("translate({} {}) scale(12 {})", short(left), short(top + height), -height / STEPS as f64);
-    canvas.marks.push(Mark::Cells { transform, layers: layers.collect() });
-    let scale = Scale::linear(low, high);
+    canvas.marks.push(Mark::Cells { layers: layers.collect() });
     for tick in scale.ticks(4) {
         let Some(place) = scale.place(tick.value) else { continue };
         let y = top + height * (1.0 - place);
         canvas.segment("axis", (left + 12.0, y), (left + 16.0, y));
-        canvas.text("tick", (left + 20.0, y + 4.0), &bar_label(tick.value, &tick.label));
+        canvas.text("tick", (left + 20.0, y + 4.0), &tick.label);
     }
     canvas.text("tick", (left, top - 12.0), label);
-}
-
-/// Short, by a power of ten where it is small.
-fn bar_label(value: f64, label: &str) -> String {
-    let small = value != 0.0 && value.abs() < 0.01;
-    if small { power_label(value) } else { minus(label) }
 }
 
 /// `#rrggbb`.
@@ -147,20 +147,16 @@ mod tests {
             y_label: String::new(),
             x: Scale::linear(0.0, 1.0),
             y: Scale::linear(0.0, 1.0),
-            cells: (3, 2),
+            x_borders: vec![0.0, 0.5, 0.75, 1.0],
+            y_borders: vec![0.0, 0.5, 1.0],
             values: vec![Some(1.0), Some(1.0), None, Some(f64::NAN), Some(-1.0), Some(1.0)],
             map: ColorMap::Diverging,
             range: (-1.0, 1.0),
             color_label: String::new(),
             width: 300.0,
         };
-        let layers = map.layers();
-        assert_eq!(
-            layers,
-            [
-                (hex(ColorMap::Diverging.color(0.0)), "M1 1h1v1h-1z".to_owned()),
-                (hex(ColorMap::Diverging.color(1.0)), "M0 0h2v1h-2zM2 1h1v1h-1z".to_owned()),
-            ]
-        );
+        let layers = map.layers(&Area { left: 0.0, top: 0.0, width: 8.0, height: 4.0 });
+        let [low, high] = [0.0, 1.0].map(|t| hex(ColorMap::Diverging.color(t)));
+        assert_eq!(layers, [(low, "M4 2H6V0H4z".to_owned()), (high, "M0 4H6V2H0zM6 2H8V0H6z".to_owned())]);
     }
 }

@@ -20,7 +20,7 @@ pub struct Slope {
 pub struct LogLog {
     /// What it shows.
     pub title: String,
-    /// Label of the horizontal axis, "time [s]" say.
+    /// Label of the horizontal axis, `time [s]` say.
     pub x_label: String,
     /// Label of the vertical axis.
     pub y_label: String,
@@ -84,7 +84,9 @@ mod tests {
         let points = [1.0, 4.0, 16.0].map(|x: f64| Point::new(x, 2.0 / x.sqrt())).to_vec();
         let series = vec![Series { name: "s".into(), marks: Marks::Both, points, color: 1 }];
         let slope = Slope { name: "−½".into(), slope: -0.5, beside: 0 };
-        let found = reference(&slope, &series, Scale { low: 1.0, high: 20.0, log: true }).expect("a line");
+        let found =
+            reference(&slope, &series, Scale { low: 1.0, high: 20.0, spacing: super::super::scale::Spacing::Log })
+                .expect("a line");
         let [a, b] = [found.points[0], found.points[1]];
         assert!(((b.y / a.y).ln() / (b.x / a.x).ln() + 0.5).abs() < 1e-12);
         assert!((a.y * 1.6 - 2.0).abs() < 1e-12, "{a:?}");

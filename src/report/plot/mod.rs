@@ -9,6 +9,7 @@ mod canvas;
 mod chart;
 mod disc;
 mod heat;
+mod legend;
 mod loglog;
 mod polar;
 mod raster;
@@ -18,11 +19,14 @@ mod style;
 pub use chart::{Chart, LegendPlace, Marks, Point, Series};
 pub use disc::{Disc, DiscCell};
 pub use heat::HeatMap;
+pub(in crate::report) use heat::hex;
+pub(in crate::report) use legend::{dot_class, line_class};
 pub use loglog::{LogLog, Slope};
 pub use polar::PolarChart;
 pub use raster::RasterError;
-pub use scale::{Scale, Tick};
-pub use style::{DARK, LIGHT, page_css};
+pub(in crate::report) use scale::minus;
+pub use scale::{Scale, Spacing, Tick};
+pub(in crate::report) use style::{DARK, LIGHT, page_css, variables};
 
 use askama::Template;
 use canvas::Canvas;
@@ -56,6 +60,21 @@ impl Figure {
         self
     }
 
+    /// Figures side by side, `columns` in a row.
+    #[must_use]
+    pub fn grid(figures: &[Self], columns: usize, title: &str) -> Self {
+        let columns = columns.clamp(1, figures.len().max(1));
+        let width = figures.iter().map(|f| f.canvas.width).fold(0.0, f64::max);
+        let height = figures.iter().map(|f| f.canvas.height).fold(0.0, f64::max);
+        let rows = figures.len().div_ceil(columns);
+        let mut canvas = Canvas::new(width * columns as f64, height * rows as f64);
+        for (k, figure) in figures.iter().enumerate() {
+            canvas.place(&figure.canvas, (width * (k % columns) as f64, height * (k / columns) as f64));
+        }
+        let described: Vec<String> = figures.iter().map(|f| format!("{}: {}", f.title, f.description)).collect();
+        Self::new(canvas, title, described.join(". "))
+    }
+
     /// Width and height, in units of a CSS pixel.
     #[must_use]
     pub fn size(&self) -> (f64, f64) {
@@ -68,7 +87,7 @@ impl Figure {
         self.markup(Some(style::paper_css()))
     }
 
-    /// SVG to stand in a page, which brings the style ([`page_css`]).
+    /// SVG to stand in a page, which brings the style.
     #[must_use]
     pub fn inline(&self) -> String {
         self.markup(None)

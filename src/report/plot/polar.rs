@@ -3,8 +3,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::Figure;
-use super::canvas::{Canvas, line, short};
-use super::chart::{Marks, Series, dot_class, draw_legend, legend_rows, line_class};
+use super::canvas::{Canvas, Mark, Px, line, short};
+use super::chart::{Marks, Series};
+use super::legend::{dot_class, draw_legend, legend_rows, line_class};
 use super::scale::Scale;
 
 /// A polar chart over the half-plane above a surface: angles from −90° to 90°, 0° upwards, positive to the right.
@@ -39,10 +40,10 @@ impl PolarChart {
         let radius = 0.5 * self.width - MARGIN;
         let top = if self.titled { 46.0 } else { 26.0 };
         let center = (0.5 * self.width, top + radius);
-        let base = center.1 + 40.0;
+        let base = center.1 + 46.0;
         let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), s.marks, s.color)).collect();
         let rows = if self.legend { legend_rows(&names, self.width - 20.0) } else { Vec::new() };
-        let mut canvas = Canvas::new(self.width, base + 18.0 * rows.len() as f64);
+        let mut canvas = Canvas::new(self.width, base + 6.0 + 18.0 * rows.len() as f64);
         if self.titled {
             canvas.text("head", (10.0, 18.0), &self.title);
         }
@@ -51,11 +52,10 @@ impl PolarChart {
             incident(&mut canvas, center, radius, angle);
         }
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, center, radius, s)));
-        draw_legend(&mut canvas, &rows, 10.0, base + 10.0);
-        let scale = format!("{} {} {}", self.scale.low, self.scale.high, if self.scale.log { "log" } else { "linear" });
+        draw_legend(&mut canvas, &rows, 10.0, base + 12.0);
         Figure::new(canvas, &self.title, &self.description)
             .with_data("polar", format!("{} {} {radius}", center.0, center.1))
-            .with_data("r", scale)
+            .with_data("r", self.scale.data())
     }
 
     fn frame(&self, canvas: &mut Canvas, center: (f64, f64), radius: f64) {
@@ -110,18 +110,13 @@ fn half_circle(center: (f64, f64), radius: f64) -> String {
     format!("M{left} {y}A{r} {r} 0 0 1 {right} {y}")
 }
 
-/// The incident light, an arrow to the centre.
-fn incident(canvas: &mut Canvas, center: (f64, f64), radius: f64, degrees: f64) {
-    let tip = ray(center, 0.06 * radius, -degrees);
-    let sides = [-0.09, 0.09].map(|side| {
-        let back = ray(center, 0.06 * radius + 9.0, -degrees);
-        let across = ray((0.0, 0.0), 40.0 * side, -degrees + 90.0);
-        (back.0 + across.0, back.1 + across.1)
-    });
-    canvas.group("incident", |c| {
-        c.segment("ray", ray(center, radius, -degrees), tip);
-        c.path("head-of-ray", line([sides[0], tip, sides[1]]) + "Z");
-    });
+/// The incident light, an arrow to the centre: drawn upright, then turned.
+fn incident(canvas: &mut Canvas, (x, y): (f64, f64), radius: f64, degrees: f64) {
+    let tip = y - 0.06 * radius;
+    canvas.marks.push(Mark::Turn { class: "incident".into(), degrees: Px(-degrees), x: Px(x), y: Px(y) });
+    canvas.segment("ray", (x, y - radius), (x, tip - 7.0));
+    canvas.path("head-of-ray", line([(x - 3.6, tip - 9.0), (x, tip), (x + 3.6, tip - 9.0)]) + "Z");
+    canvas.marks.push(Mark::End);
 }
 
 #[cfg(test)]

@@ -1,14 +1,27 @@
 //! From values to places along an axis, and the marks on it.
 
-/// A linear or logarithmic scale between two values.
+/// How values are spread along a scale.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spacing {
+    /// Equal steps are equal differences.
+    Linear,
+    /// Equal steps are equal factors; both ends are positive.
+    Log,
+    /// Linear, with marks as angles have them.
+    Degrees,
+    /// Equal steps are equal differences of the square root, as MERL's θh has them; no end is negative.
+    Root,
+}
+
+/// A scale between two values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     /// Value at the beginning.
     pub low: f64,
     /// Value at the end.
     pub high: f64,
-    /// Whether equal steps are equal factors; both ends are positive then.
-    pub log: bool,
+    /// How values are spread.
+    pub spacing: Spacing,
 }
 
 /// A mark on an axis.
@@ -25,7 +38,19 @@ impl Scale {
     #[must_use]
     pub fn linear(low: f64, high: f64) -> Self {
         let high = if high > low { high } else { low + 1.0 };
-        Self { low, high, log: false }
+        Self { low, high, spacing: Spacing::Linear }
+    }
+
+    /// A scale of degrees.
+    #[must_use]
+    pub fn degrees(low: f64, high: f64) -> Self {
+        Self { spacing: Spacing::Degrees, ..Self::linear(low, high) }
+    }
+
+    /// A scale of square roots.
+    #[must_use]
+    pub fn root(low: f64, high: f64) -> Self {
+        Self { spacing: Spacing::Root, ..Self::linear(low, high) }
     }
 
     /// A linear scale over all values, with 0, and with round ends.
@@ -47,13 +72,27 @@ impl Scale {
         let low = low.max(high * 10f64.powf(-decades));
         let (low, high) = (round_down(low), -round_down(-high));
         let (low, high) = if high > low { (low, high) } else { (low / 2.0, high * 2.0) };
-        Self { low, high, log: true }
+        Self { low, high, spacing: Spacing::Log }
+    }
+
+    /// As a script reads it: low, high, spacing.
+    pub(in crate::report) fn data(&self) -> String {
+        let spacing = match self.spacing {
+            Spacing::Linear | Spacing::Degrees => "linear",
+            Spacing::Log => "log",
+            Spacing::Root => "root",
+        };
+        format!("{} {} {spacing}", self.low, self.high)
     }
 
     /// Where a value stands, 0 at the beginning and 1 at the end; beyond them outside of that. `None` for what the scale has no place for.
     #[must_use]
     pub fn place(&self, value: f64) -> Option<f64> {
-        let of = |v: f64| if self.log { v.log10() } else { v };
+        let of = |v: f64| match self.spacing {
+            Spacing::Linear | Spacing::Degrees => v,
+            Spacing::Log => v.log10(),
+            Spacing::Root => v.sqrt(),
+        };
         let place = (of(value) - of(self.low)) / (of(self.high) - of(self.low));
         place.is_finite().then_some(place)
     }
@@ -61,11 +100,15 @@ impl Scale {
     /// Marks at round values, about `count` of them with labels.
     #[must_use]
     pub fn ticks(&self, count: usize) -> Vec<Tick> {
-        if self.log { self.log_ticks(count) } else { self.linear_ticks(count) }
+        match self.spacing {
+            Spacing::Linear => self.linear_ticks(step(self.high - self.low, count)),
+            Spacing::Degrees => self.linear_ticks(if self.high - self.low > 100.0 { 30.0 } else { 15.0 }),
+            Spacing::Log => self.log_ticks(count),
+            Spacing::Root => self.root_ticks(),
+        }
     }
 
-    fn linear_ticks(&self, count: usize) -> Vec<Tick> {
-        let step = step(self.high - self.low, count);
+    fn linear_ticks(&self, step: f64) -> Vec<Tick> {
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         let first = (self.low / step - 1e-9).ceil() as i64;
         let last = (self.high / step + 1e-9).floor() as i64;
@@ -78,6 +121,13 @@ impl Scale {
         (first..=last).map(|k| Tick { value: k as f64 * step, label: label(k) }).collect()
     }
 
+    /// Degrees that stand well apart.
+    fn root_ticks(&self) -> Vec<Tick> {
+        let inside = |v: &f64| (self.low..=self.high).contains(v);
+        let values = [0.0, 1.0, 5.0, 15.0, 30.0, 60.0, 90.0].into_iter().filter(inside);
+        values.map(|value| Tick { value, label: format!("{value}") }).collect()
+    }
+
     fn log_ticks(&self, count: usize) -> Vec<Tick> {
         let (from, to) = (self.low.log10().floor() as i32, self.high.log10().ceil() as i32);
         let decades = self.high.log10() - self.low.log10();
@@ -87,7 +137,7 @@ impl Scale {
         for k in from..=to {
             for digit in 1..10 {
                 let value = f64::from(digit) * 10f64.powi(k);
-                let named = if decades < 1.7 { matches!(digit, 1 | 2 | 5) } else { digit == 1 && k % every == 0 };
+                let named = if decades < 2.2 { matches!(digit, 1 | 2 | 5) } else { digit == 1 && k % every == 0 };
                 if inside(value) && (named || every == 1 || digit == 1) {
                     ticks.push(Tick { value, label: if named { decade_label(digit, k) } else { String::new() } });
                 }
@@ -158,9 +208,12 @@ mod tests {
     #[test]
     fn ticks_are_round_and_inside() {
         assert_eq!(labels(Scale::linear(0.0, 1.0), 5), ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
-        assert_eq!(labels(Scale::linear(-90.0, 90.0), 6), ["−50", "0", "50"]);
-        assert_eq!(labels(Scale { low: 0.01, high: 100.0, log: true }, 5), ["0.01", "0.1", "1", "10", "100"]);
-        assert_eq!(labels(Scale { low: 1e-5, high: 1e-4, log: true }, 5).first().expect("one"), "10^{−5}");
+        assert_eq!(labels(Scale::degrees(-90.0, 90.0), 6), ["−90", "−60", "−30", "0", "30", "60", "90"]);
+        assert_eq!(
+            labels(Scale { low: 0.01, high: 100.0, spacing: Spacing::Log }, 5),
+            ["0.01", "0.1", "1", "10", "100"]
+        );
+        assert_eq!(labels(Scale { low: 1e-5, high: 1e-4, spacing: Spacing::Log }, 5).first().expect("one"), "10^{−5}");
         for scale in [Scale::around([0.013, 7.2]), Scale::log_around([3e-4, 20.0], 8.0)] {
             for tick in scale.ticks(5) {
                 let place = scale.place(tick.value).expect("a place");

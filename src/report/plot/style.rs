@@ -5,7 +5,7 @@
 use std::fmt::Write;
 
 /// Colours by name, on white.
-pub const LIGHT: [(&str, &str); 12] = [
+pub(in crate::report) const LIGHT: [(&str, &str); 12] = [
     ("plot-paper", "#ffffff"),
     ("plot-ink", "#1d2330"),
     ("plot-muted", "#59616f"),
@@ -21,7 +21,7 @@ pub const LIGHT: [(&str, &str); 12] = [
 ];
 
 /// The same on a dark screen.
-pub const DARK: [(&str, &str); 12] = [
+pub(in crate::report) const DARK: [(&str, &str); 12] = [
     ("plot-paper", "#171b22"),
     ("plot-ink", "#e7eaf0"),
     ("plot-muted", "#a4adbb"),
@@ -54,8 +54,7 @@ pub(super) fn paper_css() -> String {
 }
 
 /// Rules of figures in a page, which defines the colours as variables.
-#[must_use]
-pub fn page_css() -> &'static str {
+pub(in crate::report) fn page_css() -> &'static str {
     RULES
 }
 

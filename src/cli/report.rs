@@ -1,0 +1,119 @@
+//! `goniofit report`: what a run found, as one HTML page; and `--report` of the commands that make runs.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::failure::Failure;
+use super::info::Reading;
+use super::output::{check_folder, keeps_inputs, stdout_is_free, write_bytes};
+use super::ui::Ui;
+use crate::report::run::{Made, ReportError, Run, RunOptions};
+use crate::report::{Written, page};
+
+/// The page's name in a run's folder.
+const NAME: &str = "report.html";
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit report out/demo
+  goniofit report gold/ --measurement gold.binary --out gold.html")]
+pub(super) struct Args {
+    /// The folder that demo, validate or fit --out-dir wrote to
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// The measurement, where it is not where the folder's files say
+    #[arg(long, value_name = "FILE")]
+    measurement: Option<PathBuf>,
+    /// Where to write the page; `-` is stdout [default: report.html in DIR]
+    #[arg(long, value_name = "PAGE.html")]
+    out: Option<PathBuf>,
+    #[command(flatten, next_help_heading = "Reading")]
+    reading: Reading,
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    let out = args.out.clone().unwrap_or_else(|| args.folder.join(NAME));
+    stdout_is_free(&out, ui)?;
+    keeps_inputs("--out", &out, args.measurement.iter().map(PathBuf::as_path))?;
+    let options = RunOptions { measurement: args.measurement.clone(), reading: args.reading.options() };
+    let run = Run::read(&args.folder, &options)?;
+    check_folder(&out)?;
+    let written = write(&run, &out)?;
+    for missing in &written.missing {
+        ui.note(&format!("not in the report: {missing}"));
+    }
+    let size = written.html.len();
+    let object = json!({
+        "out": out, "bytes": size, "missing": written.missing, "warnings": written.warnings,
+        "fits": run.fits.iter().map(|f| &f.label).collect::<Vec<_>>(), "pictures": run.pictures.len(),
+    });
+    let said = format!("{} ({:.1} MB): open it in any browser", out.display(), size as f64 / 1e6);
+    ui.result(if out == Path::new("-") { "" } else { &said }, &object);
+    Ok(())
+}
+
+/// Writes the page of a folder into it, as `--report` asks.
+pub(super) fn of_folder(folder: &Path, options: &RunOptions) -> Result<PathBuf, Failure> {
+    let out = folder.join(NAME);
+    write(&Run::read(folder, options)?, &out)?;
+    Ok(out)
+}
+
+/// Writes the page of a run.
+pub(super) fn write(run: &Run, out: &Path) -> Result<Written, Failure> {
+    let written = page(run)?;
+    write_bytes(out, written.html.as_bytes())?;
+    Ok(written)
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        match error {
+            ReportError::Chain(error) => error.into(),
+            ReportError::Page(_) => Self::work(error.to_string()),
+            _ => Self::usage(error.to_string()),
+        }
+    }
+}
+
+/// How this run was asked for: program, command and folder. What has no bearing on the result (`--threads`, `--json`, `--quiet`) is left out.
+pub(super) fn made() -> Value {
+    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into_owned()).collect();
+    json!({
+        "program": concat!("goniofit ", env!("CARGO_PKG_VERSION")),
+        "command": command(&words),
+        "folder": std::env::current_dir().ok(),
+    })
+}
+
+/// The same, as a page shows it.
+pub(super) fn this_run() -> Made {
+    Made::of(&made())
+}
+
+/// The words that matter, the program by its name.
+fn command(words: &[String]) -> Vec<String> {
+    let mut kept = vec!["goniofit".to_owned()];
+    let mut words = words.iter().skip(1);
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            "--json" | "--quiet" => {}
+            "--threads" => _ = words.next(),
+            word if word.starts_with("--threads=") => {}
+            word => kept.push(word.to_owned()),
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_change_the_result_is_left_out_of_the_command() {
+        let words = ["/opt/goniofit", "--threads", "2", "demo", "--json", "--out", "x y", "--threads=4", "--quiet"];
+        assert_eq!(command(&words.map(str::to_owned)), ["goniofit", "demo", "--out", "x y"]);
+    }
+}

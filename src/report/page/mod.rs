@@ -1,0 +1,142 @@
+//! The page: a run as one HTML file.
+
+mod compared;
+mod data;
+mod effects;
+mod fits;
+mod lobes;
+mod measured;
+mod pictures;
+mod pixels;
+mod reproduce;
+mod residuals;
+mod summary;
+mod time;
+
+use askama::Template;
+
+use super::plot::{DARK, LIGHT, page_css};
+use super::run::{ReportError, Run};
+
+/// What a page was made of.
+#[derive(Debug, Clone)]
+pub struct Written {
+    /// The page.
+    pub html: String,
+    /// What is missing, and which command writes it.
+    pub missing: Vec<String>,
+    /// Warnings that it shows.
+    pub warnings: usize,
+}
+
+#[derive(Template)]
+#[template(path = "page.html", config = "src/report/askama.toml")]
+struct Page<'a> {
+    run: &'a Run,
+    summary: summary::Summary,
+    measured: Option<measured::Measured>,
+    fits: fits::Fits,
+    lobes: Option<lobes::Lobes>,
+    residuals: Vec<residuals::Residuals>,
+    pictures: Option<pictures::Pictures>,
+    time: time::Time,
+    effects: effects::Effects,
+    reproduce: reproduce::Reproduce,
+    missing: Missing,
+    data: String,
+    css: String,
+}
+
+/// What each part lacks; empty where it lacks nothing.
+#[derive(Default)]
+struct Missing {
+    measured: String,
+    fits: String,
+    lobes: String,
+    residuals: String,
+    pictures: String,
+    tradeoff: String,
+}
+
+impl Missing {
+    fn list(&self) -> Vec<String> {
+        let all = [&self.measured, &self.fits, &self.lobes, &self.residuals, &self.pictures, &self.tradeoff];
+        all.into_iter().filter(|m| !m.is_empty()).cloned().collect()
+    }
+}
+
+/// Puts the page together.
+///
+/// # Errors
+/// [`ReportError`] where a picture can't be encoded.
+pub fn page(run: &Run) -> Result<Written, ReportError> {
+    let lobes = lobes::lobes(run);
+    let residuals = residuals::residuals(run);
+    let pictures = pictures::pictures(run)?;
+    let missing = missing(run, lobes.is_some(), pictures.is_some());
+    let data = data::json(lobes.as_ref(), &residuals, pictures.as_ref());
+    let summary = summary::summary(run);
+    let warnings = summary.warnings.len();
+    let page = Page {
+        run,
+        measured: measured::measured(run),
+        fits: fits::fits(run),
+        time: time::time(run),
+        effects: effects::effects(run),
+        reproduce: reproduce::reproduce(run),
+        css: css(),
+        summary,
+        lobes,
+        residuals,
+        pictures,
+        missing,
+        data,
+    };
+    let html = page.render().map_err(|e| ReportError::Page(e.to_string()))?;
+    Ok(Written { html, missing: page.missing.list(), warnings })
+}
+
+fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
+    let mut missing = Missing::default();
+    if let Err(reason) = &run.table {
+        let folder = run.folder.display().to_string();
+        let command = reproduce::typed(&["goniofit", "report", &folder, "--measurement", "FILE"]);
+        missing.measured = format!("The measurement is not at hand: {reason}. Name it: {command}");
+        missing.residuals = "Residuals need the measurement and a fit of it.".into();
+    }
+    if run.fits.is_empty() {
+        missing.fits = "There is no fit. Make one: goniofit fit FILE --out FIT.json".into();
+        missing.residuals = "Residuals need a fit.".into();
+    }
+    if !has_lobes {
+        missing.lobes = "Neither readings in a plane of incidence nor a fit to draw lobes of.".into();
+    }
+    if !has_pictures {
+        let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
+        let mut words = vec!["goniofit", "validate", &table];
+        words.extend(run.fits.iter().map(|f| f.file.as_str()));
+        words.extend(["--out", "DIR", "--report"]);
+        let command = reproduce::typed(&words);
+        missing.pictures = format!("There are no pictures here. Render table and fits under the same light: {command}");
+    }
+    if run.sweeps.is_empty() {
+        let folder = run.folder.join("tradeoff").display().to_string();
+        let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
+        let command = reproduce::typed(&["goniofit", "tradeoff", "fit", &table, "--out", &folder]);
+        missing.tradeoff = format!("How much accuracy another second buys is not measured here: {command}");
+    }
+    missing
+}
+
+/// The page's style: colours for both themes, then the rules.
+fn css() -> String {
+    let variables = super::plot::variables;
+    let dark = variables(&DARK);
+    format!(
+        ":root{{{}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}\
+         @media screen{{:root[data-theme=dark]{{{dark}}}}}\n{}\n{}",
+        variables(&LIGHT),
+        include_str!("../templates/page.css"),
+        page_css()
+    )
+}

@@ -1,0 +1,88 @@
+//! How to make all of it again.
+
+use crate::report::run::{Kind, Run};
+
+/// A command and what it makes.
+pub(super) struct Command {
+    pub makes: String,
+    pub typed: String,
+}
+
+pub(super) struct Reproduce {
+    pub program: String,
+    pub folder: String,
+    pub seed: String,
+    pub run: Option<String>,
+    pub commands: Vec<Command>,
+}
+
+pub(super) fn reproduce(run: &Run) -> Reproduce {
+    let own = concat!("goniofit ", env!("CARGO_PKG_VERSION"));
+    let program = match &run.made.program {
+        Some(program) if program != own => format!("{program}; this page: {own}"),
+        _ => own.into(),
+    };
+    Reproduce {
+        program,
+        folder: run.made.folder.as_ref().map_or("–".into(), |f| f.display().to_string()),
+        seed: run.seed.map_or("–".into(), |s| s.to_string()),
+        run: (!run.made.command.is_empty()).then(|| typed(&run.made.command)),
+        commands: commands(run),
+    }
+}
+
+/// Words as they are typed in a shell.
+pub(super) fn typed<S: AsRef<str>>(words: &[S]) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+%@".contains(c);
+    let quoted = |word: &S| match word.as_ref() {
+        word if !word.is_empty() && word.chars().all(plain) => word.to_owned(),
+        word => format!("'{}'", word.replace('\'', r"'\''")),
+    };
+    words.iter().map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+fn commands(run: &Run) -> Vec<Command> {
+    let mut list = Vec::new();
+    let mut push = |makes: &str, words: &[&str]| {
+        list.push(Command { makes: makes.into(), typed: typed(words) });
+    };
+    let path = run.table.as_ref().ok().map(|t| t.path.display().to_string());
+    let files: Vec<&str> = run.fits.iter().map(|f| f.file.as_str()).collect();
+    if let Some(path) = &path {
+        push("what is in the measurement", &["goniofit", "info", path]);
+        push("the map of the hemisphere", &["goniofit", "plot", "coverage", path, "--out", "coverage.svg"]);
+        push("polar lobes", &[&["goniofit", "plot", "polar", path][..], &files, &["--out", "lobes.svg"]].concat());
+        push("slices", &[&["goniofit", "plot", "slice", path][..], &files, &["--out", "slices.svg"]].concat());
+        for fit in &run.fits {
+            let mut words = vec!["goniofit", "plot", "residuals", path, &fit.file];
+            let seen = fit.material().fit.as_ref().is_some_and(|record| record.through.is_some());
+            if let Some(instrument) = run.instrument.as_deref().filter(|_| seen) {
+                words.extend(["--through", instrument]);
+            }
+            words.extend(["--out", "residuals.svg"]);
+            push("residual maps", &words);
+        }
+    }
+    if let Some((first, others)) = run.pictures.split_first() {
+        for other in others {
+            let [a, b] = [&other.file, &first.file].map(|f| run.folder.join(f).display().to_string());
+            push("numbers of the pictures", &["goniofit", "compare", &a, &b]);
+        }
+    }
+    let folder = run.folder.display().to_string();
+    if run.kind != Kind::Fit {
+        push("this page", &["goniofit", "report", &folder]);
+    }
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_split_them() {
+        let words = ["goniofit", "fit", "my lab.csv", "it's", "a+b.json"];
+        assert_eq!(typed(&words), r"goniofit fit 'my lab.csv' 'it'\''s' a+b.json");
+    }
+}

@@ -1,0 +1,51 @@
+//! Why there is no report.
+
+use std::path::PathBuf;
+
+use crate::chain::ChainError;
+
+/// Why a folder can't be reported on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// No folder.
+    #[error("{path}: expected the folder that demo, validate or fit wrote to, found no such folder", path = path.display())]
+    NoFolder {
+        /// What was named.
+        path: PathBuf,
+    },
+    /// Nothing in it.
+    #[error("{path}: expected numbers.json of demo or validate, or fits (.json), found neither", path = path.display())]
+    Nothing {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A numbers.json of neither command.
+    #[error("{path}: expected what demo or validate write, found an object with neither `truth` nor `reference`", path = path.display())]
+    Numbers {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file's JSON is broken.
+    #[error("{path}: {source}", path = path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
+    /// The disk refused.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file of the run can't be read.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// The page can't be put together.
+    #[error("the page: {0}")]
+    Page(String),
+}

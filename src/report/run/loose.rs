@@ -1,0 +1,63 @@
+//! A folder with fits in it, as `fit --out-dir` leaves one.
+
+use std::path::{Path, PathBuf};
+
+use super::{Kind, ReportError, Run, RunFit, RunOptions, Table};
+use crate::brdf::Material;
+use crate::report::views::Predicted;
+
+/// Names that a measurement beside its fits may have.
+const MEASUREMENTS: [&str; 2] = ["csv", "binary"];
+
+pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportError> {
+    let fits = fits(folder)?;
+    if fits.is_empty() {
+        return Err(ReportError::Nothing { path: folder.into() });
+    }
+    let path = options.measurement.clone().or_else(|| only_measurement(folder));
+    let unknown = "which measurement the fits are of is not known: name it by --measurement FILE";
+    let table = path.map_or_else(|| Err(unknown.into()), |path| Table::read(&path, &options.reading));
+    let name = folder.canonicalize().ok().and_then(|f| f.file_name().map(|n| n.to_string_lossy().into_owned()));
+    let title = table.as_ref().map(|t| t.measurement.name.clone()).ok().or(name);
+    Ok(Run {
+        kind: Kind::Fit,
+        folder: folder.into(),
+        title: title.unwrap_or_else(|| "fits".into()),
+        table,
+        fits,
+        ..Run::empty()
+    })
+}
+
+/// Every material in the folder, by name.
+fn fits(folder: &Path) -> Result<Vec<RunFit>, ReportError> {
+    let mut found = Vec::new();
+    for path in files(folder)?.into_iter().filter(|p| p.extension().is_some_and(|e| e == "json")) {
+        let text = std::fs::read_to_string(&path).map_err(|source| ReportError::Io { path: path.clone(), source })?;
+        // Other JSON may lie there too.
+        let Ok(material) = Material::from_json(&text) else { continue };
+        let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+        let file = path.display().to_string();
+        found.push(RunFit { label: stem, file, predicted: Predicted::new(&material, None), image: None });
+    }
+    Ok(found)
+}
+
+/// The folder's files by name.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
+    let refused = |source| ReportError::Io { path: folder.into(), source };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(refused)? {
+        files.push(entry.map_err(refused)?.path());
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// The measurement in the folder, if there is just one file that may be one.
+fn only_measurement(folder: &Path) -> Option<PathBuf> {
+    let is_one = |p: &PathBuf| p.extension().is_some_and(|e| MEASUREMENTS.iter().any(|m| e == *m));
+    let mut found = files(folder).ok()?.into_iter().filter(is_one);
+    let only = found.next()?;
+    found.next().is_none().then_some(only)
+}

@@ -1,0 +1,268 @@
+//! What a run left in its folder, read back.
+
+mod demo;
+mod error;
+mod loose;
+mod table;
+mod validated;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+pub(in crate::report) use demo::find as instrument;
+pub use error::ReportError;
+pub use table::Table;
+
+use super::views::Predicted;
+use crate::brdf::Material;
+use crate::image::Image;
+use crate::measurement::{Measurement, ReadOptions};
+
+/// Which command left the files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `demo`
+    Demo,
+    /// `validate`
+    Validate,
+    /// `fit`, or a folder with fits in it.
+    Fit,
+}
+
+/// A fit of a run.
+#[derive(Debug)]
+pub struct RunFit {
+    /// What it is called: its model, or its file where there are several of one model.
+    pub label: String,
+    /// Its file, as one would type it.
+    pub file: String,
+    /// The material, and what it is seen through.
+    pub predicted: Predicted,
+    /// How its picture differs from the reference's, as `numbers.json` has it; none where there is no such picture.
+    pub image: Option<Value>,
+}
+
+impl RunFit {
+    /// The material.
+    #[must_use]
+    pub fn material(&self) -> &Material {
+        self.predicted.material()
+    }
+}
+
+/// A picture of a run.
+#[derive(Debug)]
+pub struct Picture {
+    /// What it shows.
+    pub label: String,
+    /// Its file in the folder.
+    pub file: String,
+    /// Linear radiance.
+    pub image: Image,
+}
+
+/// How a run was asked for.
+#[derive(Debug, Clone, Default)]
+pub struct Made {
+    /// Program and version.
+    pub program: Option<String>,
+    /// The command as it would be typed, the program's name first.
+    pub command: Vec<String>,
+    /// The folder that it was typed in.
+    pub folder: Option<PathBuf>,
+}
+
+/// A run: its files, read.
+#[derive(Debug)]
+pub struct Run {
+    /// Which command left it.
+    pub kind: Kind,
+    /// The folder.
+    pub folder: PathBuf,
+    /// What was measured.
+    pub title: String,
+    /// The measurement, or why there is none.
+    pub table: Result<Table, String>,
+    /// What was measured, where that is known: a simulation's truth.
+    pub truth: Option<Predicted>,
+    /// The fits.
+    pub fits: Vec<RunFit>,
+    /// Pictures, the one that others are compared with first.
+    pub pictures: Vec<Picture>,
+    /// Exposure of the previews, stops.
+    pub exposure: Option<f64>,
+    /// Time of each stage, s.
+    pub times: Vec<(String, f64)>,
+    /// The instrument's name, of a simulation.
+    pub instrument: Option<String>,
+    /// The scene's name.
+    pub scene: Option<String>,
+    /// Seed of noise and pictures.
+    pub seed: Option<u64>,
+    /// How the run was asked for.
+    pub made: Made,
+    /// What the reader must know besides the fits' own warnings.
+    pub notes: Vec<String>,
+    /// What `goniofit effects --json` found, where its output lies in the folder as `effects.json`.
+    pub effects: Option<Value>,
+    /// What `goniofit tradeoff` measured: every `tradeoff.json` in the folder, or in a folder within it.
+    pub sweeps: Vec<Value>,
+}
+
+/// What `numbers.json` does not say.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// The measurement, where it lies elsewhere than the folder says.
+    pub measurement: Option<PathBuf>,
+    /// How to read it.
+    pub reading: ReadOptions,
+}
+
+impl Run {
+    /// Reads a folder.
+    ///
+    /// # Errors
+    /// [`ReportError`] where there is nothing to report, or a file that belongs to it can't be read.
+    pub fn read(folder: &Path, options: &RunOptions) -> Result<Self, ReportError> {
+        let path = folder.join("numbers.json");
+        if !folder.is_dir() {
+            return Err(ReportError::NoFolder { path: folder.into() });
+        }
+        let mut run = if path.is_file() {
+            let numbers = json(&path)?;
+            if numbers.get("truth").is_some() {
+                demo::read(folder, &numbers, options)?
+            } else if numbers.get("reference").is_some() {
+                validated::read(folder, &numbers, options)?
+            } else {
+                return Err(ReportError::Numbers { path });
+            }
+        } else {
+            loose::read(folder, options)?
+        };
+        let effects = folder.join("effects.json");
+        if effects.is_file() {
+            run.effects = Some(json(&effects)?);
+        }
+        run.sweeps = sweeps(folder)?.iter().map(|path| json(path)).collect::<Result<_, _>>()?;
+        Ok(run)
+    }
+
+    /// A measurement and one fit of it, as `fit` has them at hand.
+    #[must_use]
+    pub fn of_fit(
+        path: &Path,
+        measurement: Measurement,
+        file: &str,
+        material: &Material,
+        through: Through,
+        made: Made,
+    ) -> Self {
+        let label = material.model();
+        let table = Table::new(path, measurement);
+        Self {
+            kind: Kind::Fit,
+            folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
+            title: table.measurement.name.clone(),
+            table: Ok(table),
+            fits: vec![RunFit { label, file: file.into(), predicted: Predicted::new(material, through), image: None }],
+            made,
+            ..Self::empty()
+        }
+    }
+
+    fn empty() -> Self {
+        Self {
+            kind: Kind::Fit,
+            folder: PathBuf::new(),
+            title: String::new(),
+            table: Err(String::new()),
+            truth: None,
+            fits: Vec::new(),
+            pictures: Vec::new(),
+            exposure: None,
+            times: Vec::new(),
+            instrument: None,
+            scene: None,
+            seed: None,
+            made: Made::default(),
+            notes: Vec::new(),
+            effects: None,
+            sweeps: Vec::new(),
+        }
+    }
+}
+
+/// What lobes are seen through.
+pub type Through = Option<std::sync::Arc<dyn crate::brdf::Sight>>;
+
+/// The JSON in a file.
+fn json(path: &Path) -> Result<Value, ReportError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ReportError::Io { path: path.into(), source })?;
+    serde_json::from_str(&text).map_err(|source| ReportError::Json { path: path.into(), source })
+}
+
+impl Made {
+    /// As `run` in `numbers.json` says it.
+    #[must_use]
+    pub fn of(run: &Value) -> Self {
+        let words = run["command"].as_array().into_iter().flatten();
+        Self {
+            program: run["program"].as_str().map(str::to_owned),
+            command: words.filter_map(|w| w.as_str().map(str::to_owned)).collect(),
+            folder: run["folder"].as_str().map(PathBuf::from),
+        }
+    }
+}
+
+/// A file that was named in another folder than this: as it is, from the run's folder, beside the results.
+fn found(name: &str, made: &Made, folder: &Path) -> PathBuf {
+    let path = PathBuf::from(name);
+    let there = made.folder.iter().map(|f| f.join(&path));
+    let beside = path.file_name().map(|f| folder.join(f));
+    let places = there.chain([path.clone()]).chain(beside);
+    places.into_iter().find(|p| p.is_file()).unwrap_or(path)
+}
+
+/// A picture of the folder, if it is there.
+fn picture(folder: &Path, file: &str, label: &str) -> Result<Option<Picture>, ReportError> {
+    let path = folder.join(file);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let image = crate::image::read_exr(&path).map_err(crate::chain::ChainError::from)?;
+    Ok(Some(Picture { label: label.into(), file: file.into(), image }))
+}
+
+/// Where sweeps lie, by name.
+fn sweeps(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
+    const NAME: &str = "tradeoff.json";
+    let entries = std::fs::read_dir(folder).map_err(|source| ReportError::Io { path: folder.into(), source })?;
+    let within = entries.filter_map(Result::ok).map(|e| e.path().join(NAME));
+    let mut found: Vec<PathBuf> = within.chain([folder.join(NAME)]).filter(|p| p.is_file()).collect();
+    found.sort();
+    Ok(found)
+}
+
+/// The note on a run that was ended early.
+fn stopped(numbers: &Value) -> Option<String> {
+    let is_stopped = numbers["stopped"] == true;
+    is_stopped.then(|| "The run was stopped early: pictures are missing or have fewer samples than asked for.".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_found_where_the_run_was_made_or_beside_its_results() {
+        let (there, results) = (tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder"));
+        let made = Made { folder: Some(there.path().into()), ..Made::default() };
+        assert_eq!(found("lab.csv", &made, results.path()), PathBuf::from("lab.csv"), "nowhere: as it was typed");
+        std::fs::write(results.path().join("lab.csv"), "x").expect("writes");
+        assert_eq!(found("data/lab.csv", &made, results.path()), results.path().join("lab.csv"));
+        std::fs::write(there.path().join("lab.csv"), "x").expect("writes");
+        assert_eq!(found("lab.csv", &made, results.path()), there.path().join("lab.csv"));
+    }
+}

@@ -1,0 +1,13 @@
+//! What figures show, computed: curves in the plane of incidence, residuals in bins, covered directions, reflected light.
+
+mod coverage;
+mod energy;
+mod predict;
+mod residuals;
+mod slices;
+
+pub use coverage::{Coverage, CoverageCell, coverage, coverage_figure, masked_figure};
+pub use energy::{AlbedoCurve, albedo_curves, energy_figure};
+pub use predict::Predicted;
+pub use residuals::{Binned, ResidualMaps, Statistic, residual_figure, residual_maps, residual_range};
+pub use slices::{Curve, Shown, Slice, default_channel, incidences, polar_figure, scale_of, slice, slice_figure};
