@@ -118,6 +118,11 @@ impl<'a> Adviser<'a> {
             all.extend(self.between(wish));
             all.extend(self.beyond(wish).filter(|_| all.is_empty() || !matches!(wish, Wish::Error(..))));
         }
+        // Rounding of a size must not have spoilt it.
+        let slack = 1.0 + 1e-9;
+        all.retain(|a| {
+            meets(a.error.at_most / slack, a.seconds.at_most / slack, a.instrument_s.map(|s| s / slack), wish)
+        });
         all
     }
 
@@ -141,6 +146,9 @@ impl<'a> Adviser<'a> {
             let [a, b] = [&pair[0], &pair[1]];
             let (x, y) = (a.point.size?.ln(), b.point.size?.ln());
             let (p, q, want) = (bound(a, wish)?.ln(), bound(b, wish)?.ln(), limit(wish).ln());
+            if !(p.is_finite() && q.is_finite()) {
+                return None;
+            }
             // The errors fall with the size, times rise.
             let crosses = if matches!(wish, Wish::Error(..)) { p > want && q <= want } else { p <= want && q > want };
             crosses.then(|| self.at((x + (y - x) * (want - p) / (q - p)).exp(), matches!(wish, Wish::Error(..))))?
@@ -202,7 +210,9 @@ impl<'a> Adviser<'a> {
         }
         let pair = logs.windows(2).find(|pair| x <= pair[1].0)?;
         let share = (x - pair[0].0) / (pair[1].0 - pair[0].0);
-        Some((pair[0].1 + share * (pair[1].1 - pair[0].1)).exp())
+        let value = pair[0].1 + share * (pair[1].1 - pair[0].1);
+        // To an error of 0, of all there is, no power law leads.
+        value.is_finite().then(|| value.exp())
     }
 
     fn slope_of(&self, of: impl Fn(&Known<'_>) -> Option<Forecast>) -> Option<Estimate> {
@@ -382,6 +392,21 @@ mod tests {
                 assert_eq!(advice.beyond, size > 1024.0);
             }
             assert!(held >= 178, "{wish:?}: {held} of 200");
+        }
+    }
+
+    /// A fit to all samples is off by nothing; what lies between it and a part is not known.
+    #[test]
+    fn nothing_is_promised_on_the_way_to_an_error_of_0() {
+        let mut sweep = sweep_of(4);
+        if let Some(last) = sweep.curves[0].points.last_mut() {
+            last.trials.iter_mut().for_each(|t| t.errors[0] = 0.0);
+        }
+        let advice = advise(&sweep, &Wish::Error(None, 0.01)).expect("within reach");
+        assert_eq!((advice.setting.as_str(), advice.error.at_most), ("--samples 1024", 0.0));
+        for most in [0.03, 0.05, 0.1] {
+            let advice = advise(&sweep, &Wish::Error(None, most)).expect("within reach");
+            assert!(advice.error.at_most <= most * (1.0 + 1e-9), "{advice:?}");
         }
     }
 
