@@ -15,3 +15,4 @@ pub mod numeric;
 pub mod radiometry;
 pub mod render;
 pub mod report;
+pub mod tradeoff;

@@ -23,7 +23,7 @@ pub use error::ChainError;
 pub use gallery::{Gallery, Shown, write_gallery};
 pub use library::{BuiltInMaterial, MATERIALS};
 pub use measure::{measure, measure_raw, reduced, reduced_until, tabulate, with_job};
-pub use pictures::{Stage, picture, picture_of};
+pub use pictures::{Stage, picture, picture_of, scene};
 pub use scatter::{Scatter, integrated_scatter};
 pub use scene_effects::{SceneEffect, SceneEffects, scene_effects, scene_plan};
 pub use source::{Source, load, load_material, render_material, shown_channels};

@@ -43,6 +43,14 @@ pub fn picture(
     Ok(render(&scene, options, control)?.to_image())
 }
 
+/// The stage's scene with `subject` in the place of its replaceable material.
+///
+/// # Errors
+/// As [`picture`].
+pub fn scene(stage: &Stage, subject: Option<Material>) -> Result<Scene, ChainError> {
+    scene_of(stage, subject).map(|found| found.0)
+}
+
 /// The stage's scene with `subject` in the place of its replaceable material, and the materials that were given to it.
 pub(super) fn scene_of(stage: &Stage, subject: Option<Material>) -> Result<(Scene, Materials), ChainError> {
     let mut materials = Materials::new();

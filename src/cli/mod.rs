@@ -6,6 +6,7 @@
 
 mod compare;
 mod comparison;
+mod completions;
 mod convert;
 mod demo;
 mod effects;
@@ -14,6 +15,7 @@ mod fit;
 mod info;
 mod instrument;
 mod instruments;
+mod man;
 mod models;
 mod output;
 mod plan;
@@ -24,6 +26,7 @@ mod report;
 mod scenes;
 mod simulate;
 mod simulation;
+mod tradeoff;
 mod ui;
 mod validate;
 
@@ -90,12 +93,18 @@ enum Command {
     Plot(plot::Args),
     /// Convert between measurement formats, or sample a fit onto a grid
     Convert(convert::Args),
+    /// Say what accuracy costs in time, and which setting a wanted error or time takes
+    Tradeoff(tradeoff::Args),
     /// List the models and built-in materials
     Models(models::Args),
     /// List the built-in scenes, or print one as a file to start from
     Scenes(scenes::Args),
     /// List the built-in instruments, or print one as a file to start from
     Instruments(instruments::Args),
+    /// Print what a shell needs to complete this program's command lines
+    Completions(completions::Args),
+    /// Print the manual page of a command, for man(1)
+    Man(man::Args),
 }
 
 /// Runs the command that the process was started with.
@@ -143,9 +152,15 @@ fn run(command: Command, ui: &Ui) -> Result<(), Failure> {
         Command::Report(args) => report::run(&args, ui),
         Command::Plot(args) => plot::run(&args, ui),
         Command::Convert(args) => convert::run(&args, ui),
+        Command::Tradeoff(args) => tradeoff::run(&args, ui),
         Command::Models(args) => models::run(&args, ui),
         Command::Scenes(args) => scenes::run(&args, ui),
         Command::Instruments(args) => instruments::run(&args, ui),
+        Command::Completions(args) => {
+            completions::run(&args, ui);
+            Ok(())
+        }
+        Command::Man(args) => man::run(&args, ui),
     }
 }
 

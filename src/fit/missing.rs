@@ -15,7 +15,7 @@ pub(super) fn warnings(measurement: &Measurement, options: &FitOptions, valid: O
     let dark = (0..measurement.channels.len()).filter(|c| is_dark(measurement.plane(*c)));
     let dark = dark.map(|c| format!("channel {} has no positive value", measurement.channels[c]));
     let least_cos = least_cos(options);
-    let counts = |entry: usize| is_inside(measurement, options.stride, least_cos, entry);
+    let counts = |entry: usize| is_inside(measurement, options, least_cos, entry);
     let copies = copies::warning(measurement, counts);
     (missing > 0).then_some(left_out).into_iter().chain(exact(measurement, options)).chain(dark).chain(copies).collect()
 }
@@ -32,7 +32,7 @@ fn exact(measurement: &Measurement, options: &FitOptions) -> Option<String> {
         (without + gone, all + valid)
     };
     let blocks = map_blocks(entries, |block| {
-        block.filter(|entry| is_inside(measurement, options.stride, least_cos, *entry)).fold((0, 0), of_entry)
+        block.filter(|entry| is_inside(measurement, options, least_cos, *entry)).fold((0, 0), of_entry)
     });
     let (without, all) = blocks.iter().fold((0, 0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
     (without > 0).then(|| {
@@ -43,9 +43,12 @@ fn exact(measurement: &Measurement, options: &FitOptions) -> Option<String> {
 }
 
 /// Whether an entry is one of the stride's and within the angular limit.
-fn is_inside(measurement: &Measurement, stride: usize, least_cos: f64, entry: usize) -> bool {
-    let (wi, wo) = measurement.directions.pair(entry);
-    entry.is_multiple_of(stride) && wi.z.min(wo.z) >= least_cos.max(f64::MIN_POSITIVE)
+fn is_inside(measurement: &Measurement, options: &FitOptions, least_cos: f64, entry: usize) -> bool {
+    let is_within = || {
+        let (wi, wo) = measurement.directions.pair(entry);
+        wi.z.min(wo.z) >= least_cos.max(f64::MIN_POSITIVE)
+    };
+    options.takes(entry) && is_within() // a table's directions take time
 }
 
 /// Whether there are values and none of them is positive.
@@ -58,7 +61,7 @@ fn count(measurement: &Measurement, options: &FitOptions, valid: Option<usize>) 
     let least_cos = least_cos(options);
     let blocks = match measurement.directions {
         Directions::Merl(grid) if options.stride == 1 => of_grid(measurement, grid, least_cos, valid),
-        _ => of_list(measurement, options.stride, least_cos),
+        _ => of_list(measurement, options, least_cos),
     };
     blocks.iter().fold((0, 0), |sum, block| (sum.0 + block.0, sum.1 + block.1))
 }
@@ -81,10 +84,10 @@ fn of_grid(measurement: &Measurement, grid: MerlGrid, least_cos: f64, valid: Opt
     map_blocks(MerlLines::blocks(), of_blocks)
 }
 
-fn of_list(measurement: &Measurement, stride: usize, least_cos: f64) -> Vec<(usize, usize)> {
+fn of_list(measurement: &Measurement, options: &FitOptions, least_cos: f64) -> Vec<(usize, usize)> {
     let channels = measurement.channels.len();
     map_blocks(measurement.len(), |block| {
-        let entries = block.filter(|entry| is_inside(measurement, stride, least_cos, *entry));
+        let entries = block.filter(|entry| is_inside(measurement, options, least_cos, *entry));
         entries.fold((0, 0), |(missing, all), entry| {
             let gone = (0..channels).filter(|c| measurement.plane(*c)[entry].is_nan()).count();
             (missing + gone, all + channels)
@@ -127,7 +130,7 @@ mod tests {
         let table = Measurement::new("t", Directions::Merl(grid), vec!["r".into()], values);
         let least_cos = least_cos(&FitOptions { max_angle_deg: 70.0, ..options(1) });
         let sum = |blocks: Vec<(usize, usize)>| blocks.iter().fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-        let want = sum(of_list(&table, 1, least_cos));
+        let want = sum(of_list(&table, &options(1), least_cos));
         assert_eq!(sum(of_grid(&table, grid, least_cos, None)), want);
         assert_eq!(sum(of_grid(&table, grid, least_cos, Some(want.1 - want.0))), want);
     }

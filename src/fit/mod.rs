@@ -91,7 +91,7 @@ fn fit_since(clock: Instant, measurement: &Measurement, options: &FitOptions) ->
     } else if parts.iter().any(|p| p.subset.is_some()) {
         parts.iter().map(|p| p.samples).max().unwrap_or(0)
     } else {
-        Samples::gather(measurement, &model, options, &all, Thin::NONE)?.0.len()
+        Samples::gather(measurement, &model, options, &all, Thin { step: options.part, run: 1 })?.0.len()
     };
     let facts = record::Facts { measurement, options, model: &model, ranges: &ranges, parts: &parts, samples };
     let mut material = record::material(&facts);
@@ -144,7 +144,9 @@ fn fit_part(
     if time.is_some() || options.target_rmse_excess.is_some() {
         return budget::fit(measurement, model, ranges, options, channels, time);
     }
-    let (samples, transforms) = Samples::gather(measurement, model, options, channels, Thin::NONE)?;
+    let thin = Thin { step: options.part, run: 1 };
+    let (mut samples, transforms) = Samples::gather(measurement, model, options, channels, thin)?;
+    samples.are_drawn = options.part > 1;
     let mut part = part::fit(&samples, transforms, model, ranges, options)?;
     part.bootstrap =
         bootstrap::bootstrap(bootstrap::listed(&samples, options).as_ref(), &part, model, ranges, options, None)?;

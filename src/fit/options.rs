@@ -55,6 +55,12 @@ pub struct FitOptions {
     pub max_angle_deg: f64,
     /// Every how many-th entry of the measurement is used, from the first on; at least 1.
     pub stride: usize,
+    /// One of every so many entries is used, at places that keep step with no grid, as a budget or target draws them; at least 1. Where there is a budget or
+    /// target, that says how many.
+    pub part: usize,
+    /// Which of the parts alike of the samples is taken: a stride begins at entry `draw` mod `stride`, and a budget or target draws other
+    /// entries. 0 is what the command line takes.
+    pub draw: u64,
     /// Shapes of their own for every channel.
     pub per_channel: bool,
     /// Ranges of single parameters, one a parameter at most; a range of one point fixes it.
@@ -88,6 +94,8 @@ impl FitOptions {
             robust: None,
             max_angle_deg: 80.0,
             stride: 1,
+            part: 1,
+            draw: 0,
             per_channel: false,
             limits: Vec::new(),
             conserve_energy: false,
@@ -100,6 +108,11 @@ impl FitOptions {
         }
     }
 
+    /// Whether the stride takes an entry.
+    pub(super) fn takes(&self, entry: usize) -> bool {
+        self.stride == 1 || entry as u64 % self.stride as u64 == self.draw % self.stride as u64
+    }
+
     pub(super) fn validate(&self, measurement: &Measurement) -> Result<(), FitError> {
         let wrong = |field, expected, found: String| Err(FitError::Option { field, expected, found });
         if !(self.max_angle_deg > 0.0 && self.max_angle_deg <= 90.0) {
@@ -107,6 +120,9 @@ impl FitOptions {
         }
         if self.stride == 0 {
             return wrong("stride", "at least 1", "0".into());
+        }
+        if self.part == 0 {
+            return wrong("part", "at least 1", "0".into());
         }
         if let Some(excess) = self.target_rmse_excess.filter(|e| !(*e > 0.0 && e.is_finite())) {
             return wrong("target-rmse-excess", "a positive share", excess.to_string());

@@ -3,8 +3,10 @@
 //! In and out: plain numbers. The one decision to know: anything summed in parallel is summed in fixed blocks whose
 //! partial results are added in order, so results do not depend on the number of threads.
 
+pub mod estimate;
 pub mod float;
 pub mod lanes;
+pub mod line;
 pub mod quadrature;
 pub mod random;
 pub mod simd;

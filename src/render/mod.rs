@@ -33,6 +33,6 @@ pub use film::{Film, Options, render};
 pub use integrator::Strategy;
 pub use layers::LayerSet;
 pub use material::{Material, Materials, PhongEquation};
-pub use noise::PictureError;
+pub use noise::{PictureError, relative_squares};
 pub use plan::Plan;
 pub use scene::{Scene, SceneSpec};

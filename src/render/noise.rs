@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::pixel::Pixel;
-use super::tiles::Tile;
+use super::tiles::{TILE, Tile};
 use crate::numeric::stats::chi_square_quantile;
 
 /// A relative error counts against the radiance where it is above this share of the picture's mean, else against that.
@@ -72,10 +72,28 @@ pub(super) fn standard_errors(tile: Tile, pixels: &[Pixel]) -> Vec<DVec3> {
     pixels.iter().map(error).collect()
 }
 
-/// Squared errors of a pixel's channels against its radiance, summed; `mean` is the picture's.
-pub(super) fn relative_squares(squares: DVec3, radiance: DVec3, mean: f64) -> f64 {
+/// Squared errors of a pixel's channels against its radiance, summed; `mean` is the picture's. What [`PictureError`] is the root of the mean of.
+#[must_use]
+pub fn relative_squares(squares: DVec3, radiance: DVec3, mean: f64) -> f64 {
     let floor = (DARK * mean).powi(2).max(f64::MIN_POSITIVE);
     (squares / (radiance * radiance + floor)).element_sum()
+}
+
+/// What an error of a pixel counts against: its radiance, or its neighbours' mean in the tile where that is less. A sample that is far too bright raises the
+/// pixel's own mean with its error, and would hide it so.
+fn likely_radiance(tile: Tile, pixels: &[Pixel], slot: usize) -> DVec3 {
+    let (x, y) = (slot % TILE, slot / TILE);
+    let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+    for v in y.saturating_sub(1)..(y + 2).min(tile.height) {
+        for u in x.saturating_sub(1)..(x + 2).min(tile.width) {
+            if (u, v) != (x, y) {
+                sum += pixels[v * TILE + u].mean();
+                count += 1.0;
+            }
+        }
+    }
+    let own = pixels[slot].mean();
+    if count > 0.0 { own.min(sum / count) } else { own }
 }
 
 /// Sums over pixels: of the squared relative errors, and of what says how sure that is.
@@ -93,8 +111,7 @@ impl Noise {
     pub fn of(tile: Tile, pixels: &[Pixel], mean: f64) -> Self {
         let mut noise = Self::default();
         for slot in tile.slots() {
-            let pixel = &pixels[slot];
-            let value = relative_squares(pixel.disagreement(), pixel.mean(), mean);
+            let value = relative_squares(pixels[slot].disagreement(), likely_radiance(tile, pixels, slot), mean);
             noise.sum += value;
             noise.squares += value * value;
             noise.pixels += 1;

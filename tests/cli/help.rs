@@ -36,9 +36,12 @@ fn help_lists_every_command() {
         "plot",
         "report",
         "convert",
+        "tradeoff",
         "models",
         "scenes",
         "instruments",
+        "completions",
+        "man",
     ];
     for name in expected {
         assert!(found.iter().any(|f| f == name), "{name} is missing of {found:?}");

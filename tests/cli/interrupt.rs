@@ -146,3 +146,29 @@ fn a_simulation_that_is_interrupted_before_its_first_reading_writes_nothing() {
         assert!(out.is_empty() && err.contains("stopped"), "{err}");
     }
 }
+
+#[test]
+fn an_interrupted_sweep_keeps_its_trials() {
+    let b = Bench::new();
+    let args = [
+        "tradeoff",
+        "render",
+        "--size",
+        "16",
+        "--samples",
+        "4,8",
+        "--ways",
+        "scene",
+        "--trials",
+        "10000",
+        "--json",
+        "--out",
+        "t",
+    ];
+    let (code, out, err) = interrupted(&b, &args, Duration::from_secs(3));
+    assert_eq!(code, Some(130), "{err}");
+    let said: serde_json::Value = serde_json::from_slice(&out).expect("one object");
+    let trials = said["curves"][0]["points"][0]["trials"].as_array().expect("trials").len();
+    assert!((1..10_000).contains(&trials) && said["ended"] == "stopped", "{trials} trials");
+    assert_eq!(b.json_file("t/tradeoff.json")["ended"], "stopped");
+}

@@ -23,6 +23,8 @@ mod plot;
 mod real_files;
 mod report;
 mod scenes;
+mod shell;
 mod streams;
 mod threads;
 mod through;
+mod tradeoff;

@@ -52,6 +52,9 @@ pub(in crate::cli) struct Args {
     /// Use every N-th entry only
     #[arg(long, default_value_t = 1, value_name = "N", help_heading = SAMPLES)]
     pub stride: usize,
+    /// Use one of every N entries only, at places that keep step with no grid
+    #[arg(long, default_value_t = 1, value_name = "N", conflicts_with_all = ["stride", "time_budget", "target_rmse_excess"], help_heading = SAMPLES)]
+    pub part: usize,
     /// Let every channel have its own shapes
     #[arg(long, help_heading = MODEL)]
     pub per_channel: bool,
@@ -107,7 +110,7 @@ impl std::str::FromStr for Wanted {
     }
 }
 
-fn parse_loss(text: &str) -> Result<Loss, String> {
+pub(in crate::cli) fn parse_loss(text: &str) -> Result<Loss, String> {
     Loss::from_name(text).ok_or_else(|| format!("known are {}", Loss::ALL.map(Loss::name).join(", ")))
 }
 

@@ -5,6 +5,6 @@ mod plan;
 mod print;
 mod run;
 
-pub(super) use args::{Args, parse_time, parse_tolerance};
+pub(super) use args::{Args, parse_loss, parse_share, parse_time, parse_tolerance};
 pub(super) use print::plus_minus;
 pub(super) use run::run;

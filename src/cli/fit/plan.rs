@@ -31,6 +31,7 @@ impl Args {
             use_sigma: self.use_sigma,
             max_angle_deg: self.max_angle,
             stride: self.stride,
+            part: self.part,
             per_channel: self.per_channel,
             limits,
             conserve_energy: self.conserve_energy,

@@ -73,7 +73,7 @@ impl Facts<'_> {
             }
         }
         let refused: usize = self.parts.iter().map(|p| p.refused).sum();
-        let whole = !self.options.use_sigma && self.parts.iter().all(|p| p.subset.is_none());
+        let whole = !self.options.use_sigma && self.options.part == 1 && self.parts.iter().all(|p| p.subset.is_none());
         let valid = whole.then(|| self.parts.iter().flat_map(|p| &p.counts).sum::<usize>() + refused);
         list.extend(missing::warnings(self.measurement, self.options, valid));
         if refused > 0 {

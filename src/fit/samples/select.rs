@@ -40,12 +40,13 @@ impl Thin {
     /// All of them.
     pub const NONE: Self = Self { step: 1, run: 1 };
 
-    /// Those of a range that are looked at.
-    fn entries(self, range: Range<usize>) -> impl Iterator<Item = usize> {
+    /// Those of a range that are looked at, of parts alike number `draw`.
+    fn entries(self, range: Range<usize>, draw: u64) -> impl Iterator<Item = usize> {
         let run = if self.step == 1 { range.end.max(1) } else { self.run };
         let group = self.step * run;
         let of_group = move |g: usize| {
-            let first = g * group + offset(g, self.step) * run;
+            // Another draw is the same sequence of places, begun elsewhere.
+            let first = g * group + offset(g.wrapping_add(draw as usize), self.step) * run;
             first.max(range.start)..(first + run).min(range.end)
         };
         (range.start / group..range.end.div_ceil(group)).flat_map(of_group)
@@ -100,8 +101,7 @@ impl Judge<'_> {
         let (mut block, mut left) = (Block::default(), Left::default());
         block.reset(channels, channels);
         let (mut w, mut y) = (vec![0.0; channels], vec![0.0; channels]);
-        let counts = |e: &usize| e.is_multiple_of(self.options.stride);
-        for entry in self.thin.entries(range).filter(counts) {
+        for entry in self.thin.entries(range, self.options.draw).filter(|e| self.options.takes(*e)) {
             left.entries += 1;
             let (wi, wo) = self.samples.measurement.directions.pair(entry);
             let place = self.samples.sight.as_ref().map(|sight| sight.place(wi, wo));
@@ -162,8 +162,8 @@ mod tests {
     #[test]
     fn thinned_entries_are_one_run_of_each_group_wherever_a_range_is_cut() {
         for thin in [Thin::NONE, Thin { step: 7, run: 1 }, Thin { step: 5, run: 12 }] {
-            let all: Vec<usize> = thin.entries(0..1000).collect();
-            let cut: Vec<usize> = [0..333, 333..334, 334..1000].into_iter().flat_map(|r| thin.entries(r)).collect();
+            let all: Vec<usize> = thin.entries(0..1000, 3).collect();
+            let cut: Vec<usize> = [0..333, 333..334, 334..1000].into_iter().flat_map(|r| thin.entries(r, 3)).collect();
             assert_eq!(all, cut);
             for group in all.chunk_by(|a, b| a / (thin.step * thin.run) == b / (thin.step * thin.run)) {
                 assert!(group.len() <= thin.run && group.windows(2).all(|p| p[1] == p[0] + 1), "{group:?}");

@@ -1,0 +1,87 @@
+//! `--advise`: a curve as the setting for a wanted error or time.
+
+use serde_json::{Value, json};
+
+use super::print::{filled, time};
+use crate::cli::fit::{parse_share, parse_time};
+use crate::cli::ui::significant;
+use crate::tradeoff::{Advice, NoAdvice, Sweep, Wish, advise};
+
+/// What was asked for, as it was typed.
+#[derive(Debug, Clone)]
+pub(super) struct Asked {
+    typed: String,
+    wish: Wish,
+}
+
+/// `error=1e-3`, `error=2%`, `flip=0.01`, `time=2s`, `instrument=30m`.
+pub(super) fn parse(text: &str) -> Result<Asked, String> {
+    let expected = "expected error=E, time=T or instrument=T, error=1e-3 or time=2s say";
+    let (name, value) = text.split_once('=').ok_or(expected)?;
+    let wish = match name.trim() {
+        "time" => Wish::Time(parse_time(value)?.as_secs_f64()),
+        "instrument" => Wish::InstrumentTime(parse_time(value)?.as_secs_f64()),
+        "error" => Wish::Error(None, parse_share(value)?),
+        "" => return Err(expected.into()),
+        measure => Wish::Error(Some(measure.to_owned()), parse_share(value)?),
+    };
+    Ok(Asked { typed: text.to_owned(), wish })
+}
+
+/// What was asked for, and the answers.
+pub(super) type Answers = Vec<(Asked, Result<Advice, NoAdvice>)>;
+
+pub(super) fn all(asked: &[Asked], sweep: &Sweep) -> Answers {
+    asked.iter().map(|asked| (asked.clone(), advise(sweep, &asked.wish))).collect()
+}
+
+pub(super) fn json(answers: &Answers) -> Value {
+    let one = |(asked, found): &(Asked, Result<Advice, NoAdvice>)| match found {
+        Ok(advice) => json!({ "asked": asked.typed, "advice": advice }),
+        Err(why) => json!({ "asked": asked.typed, "advice": null, "why": why.to_string() }),
+    };
+    answers.iter().map(one).collect()
+}
+
+pub(super) fn text(answers: &Answers, sweep: &Sweep) -> String {
+    answers.iter().map(|(asked, found)| one(asked, found, sweep)).collect()
+}
+
+fn one(asked: &Asked, found: &Result<Advice, NoAdvice>, sweep: &Sweep) -> String {
+    let Ok(advice) = found else {
+        return format!("\n{}: none\n", asked.typed); // the command fails, and says why
+    };
+    let beyond = if advice.beyond { ", beyond what was measured" } else { "" };
+    let instrument = advice.instrument_s.map_or(String::new(), |s| format!(" and {} of the instrument", time(s)));
+    let said = format!(
+        "\n{}: {} ({}{beyond}): {} {}, below {} with 95 % confidence; takes {}{instrument}, less than {} with 95 % confidence",
+        asked.typed,
+        advice.setting,
+        advice.curve,
+        advice.measure,
+        short(advice.error.expected),
+        short(advice.error.at_most),
+        time(advice.seconds.expected),
+        time(advice.seconds.at_most),
+    );
+    filled(&said, 2) + &typed(advice, sweep)
+}
+
+/// The command line, where the setting is made of options.
+fn typed(advice: &Advice, sweep: &Sweep) -> String {
+    if !advice.setting.starts_with("--") {
+        return String::new();
+    }
+    // A scan of its own takes the place of the one that was swept.
+    let own = advice.setting.split(' ').next().unwrap_or_default();
+    let words: Vec<&str> = sweep.command.split(' ').collect();
+    let place = words.iter().position(|word| *word == own);
+    let kept = words.iter().enumerate().filter(|(i, _)| place.is_none_or(|p| *i != p && *i != p + 1));
+    let kept: Vec<&str> = kept.map(|(_, word)| *word).collect();
+    format!("  {} {}\n", kept.join(" "), advice.setting)
+}
+
+/// A number in three digits.
+pub(super) fn short(x: f64) -> String {
+    if x == 0.0 || (1e-2..1e4).contains(&x) { significant(x) } else { format!("{x:.2e}") }
+}

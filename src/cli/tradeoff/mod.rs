@@ -1,0 +1,123 @@
+//! `goniofit tradeoff`: what accuracy costs in time, for the fit, the picture, the simulated measurement and the whole chain.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::failure::Failure;
+use super::fit::parse_time;
+use super::output::make_folder;
+use super::ui::{self, Ui};
+use crate::tradeoff::{Effort, Sweep};
+
+mod advice;
+mod chain;
+mod fit;
+mod plots;
+mod print;
+mod render;
+mod simulate;
+mod write;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit tradeoff fit gold.binary --out tradeoff/
+  goniofit tradeoff render --scene cornell --material gold.json --advise error=2%
+  goniofit tradeoff simulate lab.toml --material satin --advise instrument=30m
+  goniofit tradeoff chain --material gold.json --instrument commercial --budget 2h")]
+pub(super) struct Args {
+    #[command(subcommand)]
+    stage: Stage,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Stage {
+    /// Samples used, loss, model: against excess rmse, parameters, picture
+    Fit(fit::Args),
+    /// Samples, plan of effects, depth, how lights are found: against error, noise, bias, ꟻLIP
+    Render(render::Args),
+    /// Quadratures and effects in the computer's time; readings, exposure, step in the instrument's
+    Simulate(simulate::Args),
+    /// The whole chain: where does the next second buy most?
+    Chain(chain::Args),
+}
+
+/// What all stages take.
+#[derive(Debug, clap::Args)]
+struct Common {
+    /// Trials of each setting, each with a seed of its own
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    trials: u32,
+    /// Time for all of it (30s, 5m): what would end too late is not begun
+    #[arg(long, value_name = "T", value_parser = parse_time)]
+    time_budget: Option<Duration>,
+    /// The setting for a wanted error (error=1e-3, flip=0.01, …), time (time=2s) or time of the instrument (instrument=30m), with 95 % confidence; may
+    /// be repeated
+    #[arg(long, value_name = "NAME=X", value_parser = advice::parse)]
+    advise: Vec<advice::Asked>,
+    /// Folder to write tradeoff.csv, tradeoff.json and the plots to
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Common {
+    fn effort(&self, seed: u64, ui: &Ui) -> Effort {
+        let deadline = self.time_budget.map(|time| ui.start() + time);
+        Effort { trials: self.trials, seed, deadline }
+    }
+
+    /// The folder for outputs, made before long work starts.
+    fn prepare(&self) -> Result<(), Failure> {
+        self.out.as_deref().map_or(Ok(()), |folder| make_folder("--out", folder))
+    }
+
+    /// Says and writes what was found.
+    fn finish(&self, sweep: &Sweep, more: Option<(String, serde_json::Value)>, ui: &Ui) -> Result<(), Failure> {
+        if sweep.curves.is_empty() {
+            let why = sweep.ended.clone().unwrap_or_else(|| "there is nothing to try".into());
+            return Err(if ui::stop().requested() {
+                Failure::stopped("stopped before the first trial was over: nothing is written")
+            } else {
+                Failure::work(format!("no trial was made: {why}; give more time, or fewer or smaller settings"))
+            });
+        }
+        let advice = advice::all(&self.advise, sweep);
+        let mut object = serde_json::to_value(sweep).map_err(|e| Failure::work(e.to_string()))?;
+        object["advice"] = advice::json(&advice);
+        let mut text = print::text(sweep);
+        if let Some((said, found)) = more {
+            text.push_str(&said);
+            object["chain"] = found;
+        }
+        text.push_str(&advice::text(&advice, sweep));
+        if let Some(folder) = &self.out {
+            let written = write::all(folder, sweep, &object)?;
+            text.push_str(&print::filled(&format!("\nwritten to {}: {}", folder.display(), written.join(", ")), 2));
+        }
+        if let Some(why) = &sweep.ended {
+            ui.warn(&format!("{why}: some settings have fewer than {} trials, or none", sweep.trials));
+        }
+        if let Some(why) = advice.iter().find_map(|(_, found)| found.as_ref().err()) {
+            return Err(Failure::work(why.to_string()).beside(text, object));
+        }
+        ui.result(&text, &object);
+        Ok(())
+    }
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    match &args.stage {
+        Stage::Fit(args) => fit::run(args, ui),
+        Stage::Render(args) => render::run(args, ui),
+        Stage::Simulate(args) => simulate::run(args, ui),
+        Stage::Chain(args) => chain::run(args, ui),
+    }
+}
+
+/// A number above 0 and finite, from a list.
+fn parse_positive(text: &str) -> Result<f64, String> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|x: &f64| *x > 0.0 && x.is_finite())
+        .ok_or_else(|| "expected numbers above 0".into())
+}

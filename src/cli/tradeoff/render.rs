@@ -1,0 +1,101 @@
+//! `goniofit tradeoff render`.
+
+use std::path::PathBuf;
+
+use super::Common;
+use crate::chain::{self, Stage};
+use crate::cli::failure::Failure;
+use crate::cli::fit::parse_tolerance;
+use crate::cli::render::{parse_size, read_stage};
+use crate::cli::ui::Ui;
+use crate::measurement::ReadOptions;
+use crate::render::Strategy;
+use crate::tradeoff::render::{RenderSweep, Way, sweep};
+
+/// Longer side of the pictures, pixels, where none is asked for.
+const SIDE: f64 = 64.0;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  goniofit tradeoff render --scene cornell --out tradeoff/
+  goniofit tradeoff render my-scene.toml --material gold.json --advise error=1% --advise time=10s
+  goniofit tradeoff render --scene cornell --ways scene,full,independent --depths 1,2,4 --targets 10%,5%,2%")]
+pub(super) struct Args {
+    /// A scene file; `-` is stdin
+    #[arg(value_name = "SCENE.toml", conflicts_with = "scene")]
+    file: Option<PathBuf>,
+    /// A built-in scene (see `goniofit scenes`) [default: sphere-on-plane]
+    #[arg(long, value_name = "NAME")]
+    scene: Option<String>,
+    /// Material of the scene's subject: a built-in name, a fitted .json or a measurement
+    #[arg(long, value_name = "FILE")]
+    material: Option<String>,
+    /// Channels to show as red, green and blue
+    #[arg(long, value_delimiter = ',', num_args = 3, value_name = "A,B,C")]
+    rgb: Option<Vec<String>>,
+    /// Size of the pictures in pixels, WIDTHxHEIGHT or one number for both [default: 64 at most, in the scene's proportions]
+    #[arg(long, value_parser = parse_size, value_name = "SIZE")]
+    size: Option<(u32, u32)>,
+    /// Samples per pixel to try
+    #[arg(long, value_delimiter = ',', value_name = "N,N,…", default_value = "4,8,16,32,64,128,256", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    samples: Vec<u32>,
+    /// Relative errors to ask for, as by `render --target-error` (10%,2%)
+    #[arg(long, value_delimiter = ',', value_name = "E,E,…", value_parser = parse_tolerance)]
+    targets: Vec<f64>,
+    /// Ways to render: scene (its own plan), full (everything on, one path at a time), independent (points that know nothing of each other), chance and
+    /// aimed (lights found by one way alone)
+    #[arg(long, value_delimiter = ',', value_name = "WAY,…", default_value = "scene,full,independent", value_parser = parse_way)]
+    ways: Vec<Way>,
+    /// Scattering events of a path at most, to try beside the scene's
+    #[arg(long, value_delimiter = ',', value_name = "N,N,…", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    depths: Vec<u32>,
+    /// Samples per pixel of each of the reference's two pictures [default: 4 times the most]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    reference: Option<u32>,
+    /// Key of all seeds
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    common: Common,
+}
+
+fn parse_way(text: &str) -> Result<Way, String> {
+    match text.trim() {
+        "scene" => Ok(Way::Scene),
+        "full" => Ok(Way::Full),
+        "independent" => Ok(Way::Independent),
+        "chance" => Ok(Way::Lights(Strategy::MaterialOnly)),
+        "aimed" => Ok(Way::Lights(Strategy::LightsOnly)),
+        _ => Err("known are scene, full, independent, chance, aimed".into()),
+    }
+}
+
+pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    args.common.prepare()?;
+    let (stage, named) = match (&args.file, &args.scene) {
+        (Some(file), _) => (read_stage(file)?, file.display().to_string()),
+        (None, name) => {
+            let name = name.as_deref().unwrap_or("sphere-on-plane");
+            (Stage::built_in(name)?, format!("--scene {name}"))
+        }
+    };
+    let rgb: Option<[String; 3]> = args.rgb.clone().and_then(|names| names.try_into().ok());
+    let subject = match &args.material {
+        Some(name) => Some(chain::render_material(name, &chain::load(name, &ReadOptions::default())?, rgb.as_ref())?),
+        None => None,
+    };
+    let [width, height] = stage.spec.film.resolution.map(f64::from);
+    let small = |side: f64| (side * (SIDE / width.max(height)).min(1.0)).round().max(1.0) as u32;
+    let size = args.size.unwrap_or_else(|| (small(width), small(height)));
+    let mut ways = args.ways.clone();
+    ways.extend(args.depths.iter().map(|events| Way::Depth(*events)));
+    let mut samples = args.samples.clone();
+    samples.sort_unstable();
+    samples.dedup();
+    let what = RenderSweep { size, samples, targets: args.targets.clone(), ways, reference: args.reference };
+    let effort = args.common.effort(args.seed, ui);
+    let mut found = sweep(&stage, subject.as_ref(), &what, &effort, ui.control())?;
+    let material = args.material.as_ref().map_or(String::new(), |name| format!(" --material {name}"));
+    found.command = format!("goniofit render {named}{material} --size {}x{} --out OUT.exr", size.0, size.1);
+    args.common.finish(&found, None, ui)
+}

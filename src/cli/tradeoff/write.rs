@@ -1,0 +1,30 @@
+//! The files of a sweep.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::plots;
+use crate::cli::failure::Failure;
+use crate::cli::output::{write_bytes, write_text};
+use crate::tradeoff::{Sweep, to_csv};
+
+/// Width of the PNG plots, pixels.
+const PIXELS: u32 = 1200;
+
+/// Writes everything, and returns the files' names.
+pub(super) fn all(folder: &Path, sweep: &Sweep, object: &Value) -> Result<Vec<String>, Failure> {
+    let json = serde_json::to_string_pretty(object).map_err(|e| Failure::work(e.to_string()))? + "\n";
+    let files = [("tradeoff.csv", to_csv(sweep)), ("tradeoff.json", json)];
+    for (name, text) in &files {
+        write_text(&folder.join(name), text)?;
+    }
+    let mut names = files.map(|(name, _)| name.to_owned()).to_vec();
+    for plot in plots::all(sweep) {
+        let png = plot.figure.to_png(PIXELS).map_err(|e| Failure::work(format!("{}: {e}", plot.name)))?;
+        write_text(&folder.join(format!("{}.svg", plot.name)), &plot.figure.to_svg())?;
+        write_bytes(&folder.join(format!("{}.png", plot.name)), &png)?;
+        names.push(format!("{}.svg and .png", plot.name));
+    }
+    Ok(names)
+}

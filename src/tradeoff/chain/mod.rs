@@ -1,0 +1,161 @@
+//! The whole chain under a budget: readings, fit, picture, and where the next second buys most.
+//!
+//! What readings and fit leave of error in the picture is measured with pictures that share their noise, the noise of pixels on its own; both are
+//! independent, so that their squares add up. The setting for each budget is then tried as a whole, beside what was predicted of it.
+
+use std::time::Instant;
+
+use super::curve::{About, Curve, Sweep, curves};
+use super::design::{Cost, Law, Measure, Series, Setting, Theory};
+use super::knob::Knob;
+use super::sweep::{Effort, Runs, Trial, run};
+use crate::brdf::{Material, ModelSpec};
+use crate::chain::{ChainError, Stage};
+use crate::control::Control;
+use crate::gonio::{Instrument, Scan};
+
+mod links;
+mod shares;
+
+use links::{Links, Try};
+pub use shares::{Next, Share};
+
+/// What is swept.
+#[derive(Debug)]
+pub struct ChainSweep<'a> {
+    /// The truth, and what it is called.
+    pub material: &'a Material,
+    /// Its name.
+    pub name: &'a str,
+    /// What measures it.
+    pub instrument: &'a Instrument,
+    /// Where.
+    pub scan: &'a Scan,
+    /// What is fitted.
+    pub model: ModelSpec,
+    /// What is rendered.
+    pub stage: &'a Stage,
+    /// Width and height of the pictures, pixels.
+    pub size: (u32, u32),
+    /// Readings averaged at each pair of directions.
+    pub readings: Vec<u32>,
+    /// Every how many-th pair is fitted.
+    pub strides: Vec<usize>,
+    /// Samples per pixel.
+    pub samples: Vec<u32>,
+    /// Times of instrument and computer together, s; of a range where none is given.
+    pub budgets: Vec<f64>,
+}
+
+const MEASURES: [Measure; 2] = [
+    Measure {
+        name: "image",
+        what: "relative error of the picture, root of the mean of (x − truth)²/(truth² + (L̄/10)²)",
+    },
+    Measure { name: "parameters", what: "root mean square of relative errors of fitted weights and shapes" },
+];
+
+const COUNTED: Law = Law { theory: Theory::Exactly(-0.5), why: "noise of independent readings averages out" };
+const SOBOL: Law =
+    Law { theory: Theory::AtMost(-0.5), why: "scrambled Sobol' points are at least as good as independent ones" };
+
+/// Sweeps the links of the chain, shares each budget out among them, and tries the whole.
+///
+/// # Errors
+/// [`ChainError`] where a link fails.
+pub fn sweep(what: &ChainSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<(Sweep, Vec<Share>), ChainError> {
+    let began = Instant::now();
+    let mut links = Links::new(what, effort.seed, control)?;
+    let (series, settings) = design(what, &links);
+    let runs = run(&settings, effort, control, |index, turn| links.trial(settings[index].what, turn.seed))?;
+    let mut found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    let mut shares = shares::all(what, &settings, &runs);
+    let (mut ended, notes) = (runs.ended, shares::notes(&shares));
+    if ended.is_none() && !shares.is_empty() {
+        let (whole, more) = tried(&mut links, &mut shares, effort, control)?;
+        found.extend(whole);
+        ended = more;
+    }
+    let about = About {
+        stage: "chain",
+        subject: format!("{} along {} into {}", what.name, what.scan, what.stage.spec.name),
+        command: String::new(),
+        reference: vec![links.said()],
+        notes,
+    };
+    Ok((about.sweep(MEASURES.to_vec(), found, effort, ended, began), shares))
+}
+
+/// The whole chain as it was shared out.
+fn tried(
+    links: &mut Links<'_>,
+    shares: &mut [Share],
+    effort: &Effort,
+    control: Control<'_>,
+) -> Result<(Vec<Curve>, Option<String>), ChainError> {
+    let name = "whole chain, time shared out".to_owned();
+    let series =
+        [Series { name, knob: Knob::Shares, cost: Cost::Instrument, main: 0, laws: vec![None; 2], whole: 0.0 }];
+    let settings: Vec<Setting<Try>> = shares
+        .iter()
+        .map(|s| Setting {
+            instrument_s: Some(s.seconds()),
+            ..Setting::sized(0, s.seconds(), s.typed(), Try::Whole(s.readings, s.stride, s.samples))
+        })
+        .collect();
+    let effort = Effort { seed: effort.seed ^ 0x5eed, ..*effort };
+    let runs: Runs = run(&settings, &effort, control, |index, turn| links.trial(settings[index].what, turn.seed))?;
+    let found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    for point in found.iter().flat_map(|c| &c.points) {
+        let own = shares.iter_mut().filter(|s| s.typed() == point.setting);
+        own.for_each(|share| share.measured = point.errors[0]);
+    }
+    Ok((found, runs.ended))
+}
+
+/// One series a stride, over the readings; and one of samples.
+fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting<Try>>) {
+    let (mut series, mut settings) = (Vec::new(), Vec::new());
+    for &stride in &what.strides {
+        let name = if stride == 1 {
+            "readings, all fitted".into()
+        } else {
+            format!("readings, fitted with --stride {stride}")
+        };
+        let law = Some(COUNTED).filter(|_| what.instrument.is_plain());
+        series.push(Series {
+            name,
+            knob: Knob::Readings,
+            cost: Cost::Instrument,
+            main: 0,
+            laws: vec![law; 2],
+            whole: 0.0,
+        });
+        for &n in &what.readings {
+            let text = Knob::Readings.typed(f64::from(n), 0.0);
+            let setting = Setting::sized(series.len() - 1, f64::from(n), text, Try::Data(n, stride));
+            settings.push(Setting { instrument_s: links.instrument_s(n), ..setting });
+        }
+    }
+    let name = "pixels".to_owned();
+    series.push(Series {
+        name,
+        knob: Knob::Samples,
+        cost: Cost::Computer,
+        main: 0,
+        laws: vec![Some(SOBOL), None],
+        whole: 0.0,
+    });
+    for &n in &what.samples {
+        let text = Knob::Samples.typed(f64::from(n), 0.0);
+        settings.push(Setting::sized(series.len() - 1, f64::from(n), text, Try::Pixels(n)));
+    }
+    (series, settings)
+}
+
+/// Mean square of the main errors, and the median time, of every setting with enough trials.
+fn summary(trials: &[Trial]) -> Option<(f64, f64)> {
+    let squares: Vec<f64> = trials.iter().map(|t| t.errors[0].powi(2)).filter(|s| !s.is_nan()).collect();
+    let seconds = crate::numeric::estimate::median(&trials.iter().map(|t| t.seconds).collect::<Vec<_>>())?.value;
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64, seconds))
+}

@@ -1,0 +1,199 @@
+//! What accuracy of a fit costs: how many samples it takes, the loss, the model.
+
+use std::fmt::Write as _;
+use std::time::Instant;
+
+use super::curve::{About, Sweep, curves};
+use super::design::{Cost, Law, Measure, Series, Setting, Theory};
+use super::knob::Knob;
+use super::sweep::{Effort, Trial, run};
+use crate::brdf::{Material, ModelSpec};
+use crate::chain::ChainError;
+use crate::control::Control;
+use crate::fit::{FitOptions, Loss, fit};
+use crate::measurement::Measurement;
+
+mod yardstick;
+
+use yardstick::Yardstick;
+
+/// What is swept.
+#[derive(Debug, Clone)]
+pub struct FitSweep {
+    /// The fit that everything is measured against, but for the model: its loss is the yardstick.
+    pub options: FitOptions,
+    /// One of every so many entries is fitted, as by `--part`.
+    pub parts: Vec<usize>,
+    /// Every how many-th entry is fitted, as by `--stride`.
+    pub strides: Vec<usize>,
+    /// Shares by which the rmse may exceed the best one, as by `--target-rmse-excess`.
+    pub targets: Vec<f64>,
+    /// Losses; each with all parts and strides.
+    pub losses: Vec<Loss>,
+    /// Models, the one of `options` among them or not; each with all parts and strides.
+    pub models: Vec<ModelSpec>,
+}
+
+const MEASURES: [Measure; 3] = [
+    Measure { name: "excess", what: "rmse over all samples over the least one found, less 1" },
+    Measure {
+        name: "parameters",
+        what: "root mean square of relative changes of weights and shapes against the fit to all samples",
+    },
+    Measure { name: "image", what: "relative error of a ball's picture against that of the best fit to all samples" },
+];
+
+const SQUARED: Law = Law {
+    theory: Theory::Exactly(-1.0),
+    why: "the cost is a square about its minimum, and parameters scatter as the root of the number of samples; of a part of n out of N samples by 1/n − 1/N",
+};
+const SCATTER: Law = Law {
+    theory: Theory::Exactly(-0.5),
+    why: "independent samples; of a part of n out of N by the root of 1/n − 1/N",
+};
+
+/// Of steps below this there are too few parts alike to tell a slope by: a table has no more of them than the step, however often one tries.
+const FEW: usize = 10;
+
+/// One way to fit.
+struct Way {
+    options: FitOptions,
+    /// Which model, an index.
+    model: usize,
+}
+
+/// Sweeps the knobs of a measurement's fit.
+///
+/// # Errors
+/// [`ChainError`] where a fit has no answer.
+pub fn sweep(
+    measurement: &Measurement,
+    what: &FitSweep,
+    effort: &Effort,
+    control: Control<'_>,
+) -> Result<Sweep, ChainError> {
+    let began = Instant::now();
+    let models = if what.models.is_empty() { vec![what.options.model.clone()] } else { what.models.clone() };
+    let yardstick = Yardstick::new(measurement, &what.options, &models)?;
+    let (series, settings) = design(measurement, what, &models, &yardstick);
+    let runs = run(&settings, effort, control, |index, turn| {
+        let way = &settings[index].what;
+        let options = FitOptions { draw: turn.seed, ..way.options.clone() };
+        let clock = Instant::now();
+        let fitted = fit(measurement, &options)?.material;
+        let seconds = clock.elapsed().as_secs_f64();
+        Ok::<_, ChainError>(Trial { seconds, errors: yardstick.errors(&fitted, way.model)? })
+    })?;
+    let found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    let about = About {
+        stage: "fit",
+        subject: format!("{}, {} directions", measurement.name, measurement.len()),
+        command: format!("goniofit fit {}", measurement.name),
+        reference: yardstick.said(),
+        notes: notes(what),
+    };
+    Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
+}
+
+fn notes(what: &FitSweep) -> Vec<String> {
+    let parts = what.parts.iter().chain(&what.strides).any(|s| *s > 1) || !what.targets.is_empty();
+    let said = "trials take parts alike of the samples, each another one; the command itself takes the first";
+    parts.then(|| said.to_owned()).into_iter().collect()
+}
+
+/// One series a model and loss, and one of targets.
+fn design(
+    measurement: &Measurement,
+    what: &FitSweep,
+    models: &[ModelSpec],
+    yardstick: &Yardstick<'_>,
+) -> (Vec<Series>, Vec<Setting<Way>>) {
+    let (mut series, mut settings) = (Vec::new(), Vec::new());
+    let whole = measurement.len() as f64;
+    let own_loss = what.options.loss;
+    let losses = if what.losses.is_empty() { vec![own_loss] } else { what.losses.clone() };
+    for (m, model) in models.iter().enumerate() {
+        for &loss in &losses {
+            // A loss or model that is not the yardstick's best ends at an excess of its own.
+            let is_best = loss == own_loss && yardstick.is_best(m);
+            let laws = vec![
+                Some(SQUARED).filter(|_| is_best),
+                Some(SCATTER).filter(|_| loss == own_loss),
+                Some(SCATTER).filter(|_| is_best),
+            ];
+            let options = FitOptions { model: model.clone(), loss, ..what.options.clone() };
+            let name = named(model, loss, losses.len() > 1);
+            for (knob, steps) in [(Knob::Part, &what.parts), (Knob::Stride, &what.strides)] {
+                if steps.is_empty() {
+                    continue;
+                }
+                let name = if knob == Knob::Part { name.clone() } else { format!("{name}, every N-th entry") };
+                series.push(Series { name, knob, cost: Cost::Computer, main: 0, laws: laws.clone(), whole });
+                for &step in steps {
+                    let size = (whole / step as f64).max(1.0);
+                    let (part, stride) = if knob == Knob::Part { (step, 1) } else { (1, step) };
+                    let way = Way { options: FitOptions { stride, part, ..options.clone() }, model: m };
+                    let text = typed(model, loss, what, &knob.typed(size, whole));
+                    let effective = if step < FEW { f64::INFINITY } else { 1.0 / (1.0 / size - 1.0 / whole) };
+                    let setting = Setting::sized(series.len() - 1, size, text, way);
+                    settings.push(Setting { effective: Some(effective), ..setting });
+                }
+            }
+            if what.targets.is_empty() {
+                continue;
+            }
+            let name = format!("{name}, as many as a target takes");
+            let laws = vec![None; 3];
+            series.push(Series { name, knob: Knob::ExcessTarget, cost: Cost::Computer, main: 0, laws, whole });
+            for &target in &what.targets {
+                let way = Way {
+                    options: FitOptions { target_rmse_excess: Some(target), stride: 1, ..options.clone() },
+                    model: m,
+                };
+                let text = typed(model, loss, what, &Knob::ExcessTarget.typed(target, 0.0));
+                let setting = Setting::sized(series.len() - 1, target, text, way);
+                settings.push(Setting { promise: Some(target).filter(|_| is_best), ..setting });
+            }
+        }
+    }
+    (series, settings)
+}
+
+fn named(model: &ModelSpec, loss: Loss, with_loss: bool) -> String {
+    if with_loss { format!("{model}, {}", loss.name()) } else { model.to_string() }
+}
+
+/// The options of a setting, without those that are the same in all.
+fn typed(model: &ModelSpec, loss: Loss, what: &FitSweep, knob: &str) -> String {
+    let mut text = String::new();
+    if what.models.len() > 1 {
+        let _ = write!(text, "--model {model} ");
+    }
+    if what.losses.len() > 1 {
+        let _ = write!(text, "--loss {} ", loss.name());
+    }
+    text + knob
+}
+
+/// Weights and shapes of a material in a row; none of a lobe without a shape.
+fn parameters(material: &Material) -> Option<Vec<f64>> {
+    let mut all = Vec::new();
+    for lobe in &material.lobes {
+        all.extend(&lobe.weight);
+        for c in 0..material.channels.len() {
+            all.extend(lobe.shape_of(c)?);
+        }
+    }
+    Some(all)
+}
+
+/// Root mean square of the relative changes of parameters; NaN where they are not the same ones. A parameter that is 0 in the reference has none.
+#[must_use]
+pub fn parameter_error(found: &Material, reference: &Material) -> f64 {
+    let (Some(a), Some(b)) = (parameters(found), parameters(reference)) else { return f64::NAN };
+    if a.len() != b.len() {
+        return f64::NAN;
+    }
+    let changes: Vec<f64> = a.iter().zip(&b).filter(|(_, b)| **b != 0.0).map(|(a, b)| (a - b) / b).collect();
+    (changes.iter().map(|c| c * c).sum::<f64>() / changes.len() as f64).sqrt()
+}

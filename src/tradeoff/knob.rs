@@ -1,0 +1,106 @@
+//! The knobs: what of a command can be turned, and how that is typed.
+
+use serde::Serialize;
+
+/// What of a command is turned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Knob {
+    /// Samples per pixel of a picture.
+    Samples,
+    /// Relative error that a picture may have: samples go where it is noisy.
+    PictureTarget,
+    /// Every how many-th entry of a table is fitted.
+    Stride,
+    /// One of every so many entries of a table is fitted, spread over it.
+    Part,
+    /// Share by which the rmse of a fit to a part of a table may be too large.
+    ExcessTarget,
+    /// Relative error that means over the instrument's cones may have.
+    Quadrature,
+    /// Effects of the instrument that are left out.
+    Effects,
+    /// Readings averaged at each pair of directions.
+    Readings,
+    /// How long the shutter is open, as a multiple of what the instrument says.
+    Dwell,
+    /// Step of the scan, degrees.
+    Step,
+    /// How the time of the whole chain is shared out.
+    Shares,
+}
+
+impl Knob {
+    /// What its size counts, for an axis.
+    #[must_use]
+    pub fn axis(self) -> &'static str {
+        match self {
+            Self::Samples => "samples per pixel",
+            Self::PictureTarget => "relative error asked for",
+            Self::Stride | Self::Part => "directions fitted",
+            Self::ExcessTarget => "rmse excess asked for",
+            Self::Quadrature => "relative error of means over cones asked for",
+            Self::Effects => "effects left out",
+            Self::Readings => "readings a pair of directions",
+            Self::Dwell => "exposure, times the instrument's own",
+            Self::Step => "pairs of directions",
+            Self::Shares => "time in all",
+        }
+    }
+
+    /// Whether a size between two that were measured can be asked for.
+    #[must_use]
+    pub fn is_dial(self) -> bool {
+        matches!(self, Self::Samples | Self::Stride | Self::Part | Self::Readings | Self::Dwell)
+    }
+
+    /// The nearest size that can be asked for, not below `size` where `up` and not above it else; `whole` is all that there is.
+    #[must_use]
+    pub fn rounded(self, size: f64, up: bool, whole: f64) -> f64 {
+        let round = |x: f64| if up { (x - 1e-9).ceil() } else { (x + 1e-9).floor() };
+        match self {
+            Self::Samples | Self::Readings => round(size).max(1.0),
+            // More directions are a smaller stride.
+            Self::Stride | Self::Part => {
+                whole / if up { (whole / size + 1e-9).floor() } else { (whole / size - 1e-9).ceil() }.max(1.0)
+            }
+            _ => size,
+        }
+    }
+
+    /// The option for this size.
+    #[must_use]
+    pub fn typed(self, size: f64, whole: f64) -> String {
+        match self {
+            Self::Samples => format!("--samples {size:.0}"),
+            Self::PictureTarget | Self::Quadrature => format!("--target-error {}", short(size)),
+            Self::Stride => format!("--stride {:.0}", whole / size),
+            Self::Part => format!("--part {:.0}", whole / size),
+            Self::ExcessTarget => format!("--target-rmse-excess {}", short(size)),
+            Self::Readings => format!("--readings {size:.0}"),
+            Self::Dwell => format!("exposures × {}", (1e3 * size).round() / 1e3),
+            Self::Effects | Self::Step | Self::Shares => String::new(),
+        }
+    }
+}
+
+/// A number as one types it.
+fn short(x: f64) -> String {
+    if x < 1e-3 { format!("{x:e}") } else { x.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_rounded_to_the_side_that_was_asked_for() {
+        assert_eq!(Knob::Samples.rounded(12.3, true, 0.0), 13.0);
+        assert_eq!(Knob::Samples.rounded(12.3, false, 0.0), 12.0);
+        assert_eq!(Knob::Samples.rounded(12.0, true, 0.0), 12.0);
+        // 1000 directions, 130 wanted: every seventh gives 142.9, every eighth 125.
+        assert_eq!(Knob::Stride.typed(Knob::Stride.rounded(130.0, true, 1000.0), 1000.0), "--stride 7");
+        assert_eq!(Knob::Stride.typed(Knob::Stride.rounded(130.0, false, 1000.0), 1000.0), "--stride 8");
+        assert_eq!(Knob::Stride.typed(Knob::Stride.rounded(1000.0, true, 1000.0), 1000.0), "--stride 1");
+    }
+}

@@ -1,0 +1,233 @@
+//! What accuracy of a picture costs: samples, the plan of effects, depth, sampler, how lights are found.
+
+use std::time::Instant;
+
+use super::curve::{About, Sweep, curves};
+use super::design::{Cost, Law, Measure, Series, Setting, Theory};
+use super::knob::Knob;
+use super::sweep::{Effort, Trial, run};
+use crate::chain::{self, ChainError, Stage};
+use crate::control::Control;
+use crate::image::{Image, compare};
+use crate::render::{self, Material, Options, Plan, Scene, Strategy};
+
+pub(super) mod accumulate;
+
+use accumulate::{Gathered, Truth};
+
+/// What is swept.
+#[derive(Debug, Clone)]
+pub struct RenderSweep {
+    /// Width and height of the pictures, pixels.
+    pub size: (u32, u32),
+    /// Samples per pixel.
+    pub samples: Vec<u32>,
+    /// Relative errors asked for, as by `--target-error`.
+    pub targets: Vec<f64>,
+    /// Ways to render; the scene's own plan first.
+    pub ways: Vec<Way>,
+    /// Samples per pixel of each half of the reference; 4 times the most of `samples` where none is said.
+    pub reference: Option<u32>,
+}
+
+/// A way to render a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// By the plan of effects that the scene calls for.
+    Scene,
+    /// Everything on, one path at a time.
+    Full,
+    /// At most so many scattering events.
+    Depth(u32),
+    /// Lights found by one of the two ways alone, instead of both.
+    Lights(Strategy),
+    /// Points that know nothing of each other, as far as the film can: the mean of pictures of few samples, each with a seed of its own.
+    Independent,
+}
+
+/// Samples of the pictures of [`Way::Independent`], one block of packets.
+const FEW: u32 = 8;
+/// Times the most samples that half of the reference has.
+const BETTER: u32 = 4;
+
+const MEASURES: [Measure; 4] = [
+    Measure { name: "error", what: "root of the mean of (x − truth)²/(truth² + (L̄/10)²)" },
+    Measure { name: "noise", what: "its part that differs from seed to seed" },
+    Measure { name: "bias", what: "its part that all seeds share" },
+    Measure { name: "flip", what: "mean ꟻLIP against the reference" },
+];
+
+const SOBOL: Law = Law {
+    theory: Theory::AtMost(-0.5),
+    why: "scrambled Sobol' points are at least as good as independent ones, better the smoother the light",
+};
+const INDEPENDENT: Law = Law { theory: Theory::Exactly(-0.5), why: "independent samples" };
+
+impl Way {
+    fn name(self) -> String {
+        match self {
+            Self::Scene => "plan of the scene".into(),
+            Self::Full => "full integrator".into(),
+            Self::Depth(events) => format!("max_bounces = {events}"),
+            Self::Lights(Strategy::MaterialOnly) => "lights met by chance".into(),
+            Self::Lights(Strategy::LightsOnly) => "lights aimed at only".into(),
+            Self::Lights(Strategy::Combined) => "lights found both ways".into(),
+            Self::Independent => "independent samples".into(),
+        }
+    }
+
+    fn law(self) -> Law {
+        if self == Self::Independent { INDEPENDENT } else { SOBOL }
+    }
+
+    /// Whether the picture's expected value is the reference's.
+    fn is_unbiased(self) -> bool {
+        !matches!(self, Self::Depth(_))
+    }
+
+    fn options(self, options: Options) -> Options {
+        match self {
+            Self::Full => Options { plan: Some(Plan::FULL), ..options },
+            Self::Lights(strategy) => Options { strategy, ..options },
+            _ => options,
+        }
+    }
+}
+
+/// One picture to take.
+#[derive(Debug, Clone, Copy)]
+struct Shot {
+    way: usize,
+    samples: u32,
+    target: Option<f64>,
+}
+
+/// Sweeps the knobs of a scene's rendering.
+///
+/// # Errors
+/// [`ChainError`] where the scene can't be built or rendered.
+pub fn sweep(
+    stage: &Stage,
+    subject: Option<&Material>,
+    what: &RenderSweep,
+    effort: &Effort,
+    control: Control<'_>,
+) -> Result<Sweep, ChainError> {
+    let began = Instant::now();
+    let scenes: Vec<Scene> = what.ways.iter().map(|way| scene(stage, subject, *way)).collect::<Result<_, _>>()?;
+    let own = chain::scene(stage, subject.cloned())?;
+    let (width, height) = what.size;
+    let base = Options { width, height, ..Options::default() };
+    let most = what.samples.iter().copied().max().unwrap_or(FEW);
+    let half = what.reference.unwrap_or(most.saturating_mul(BETTER)).min(1 << 24);
+    let shot = |seed: u64| {
+        let options = Options { samples: half, seed: effort.seed.wrapping_add(seed), ..base };
+        render::render(&own, &options, control).map(|film| film.to_image())
+    };
+    // Seeds that no trial has: those are mixed.
+    let truth = Truth::of(&shot(u64::MAX / 2)?, &shot(u64::MAX / 2 + 1)?);
+    let (series, settings) = design(what);
+    let mut gathered: Vec<Gathered> = settings.iter().map(|_| Gathered::default()).collect();
+    let runs = run(&settings, effort, control, |index, turn| {
+        let shot = settings[index].what;
+        let options = Options { seed: turn.seed, samples: shot.samples, target_error: shot.target, ..base };
+        let (image, seconds) = picture(&scenes[shot.way], what.ways[shot.way], &options, control)?;
+        if control.stop.requested() {
+            return Ok(Trial { seconds, errors: vec![f64::NAN; 4] });
+        }
+        let error = gathered[index].add(&truth, &image);
+        let flip = compare(&image, truth.image())?.appearance.map_or(f64::NAN, |a| a.flip.mean);
+        Ok::<_, ChainError>(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN, flip] })
+    })?;
+    let parts = |index: usize, measure: usize| match measure {
+        1 => gathered[index].noise(&truth),
+        2 => gathered[index].bias(&truth),
+        _ => None,
+    };
+    let found = curves(&series, &settings, &MEASURES, &runs, &parts);
+    let smallest = runs.trials.iter().flatten().map(|t| t.errors[0]).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
+    let about = About {
+        stage: "render",
+        subject: format!("{}, {width}×{height}", stage.spec.name),
+        command: format!("goniofit render --scene {} --size {width}x{height}", stage.spec.name),
+        reference: vec![truth.said(half, smallest)],
+        notes: notes(&runs.trials),
+    };
+    Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
+}
+
+fn notes(trials: &[Vec<Trial>]) -> Vec<String> {
+    let close = trials.iter().flatten().filter(|t| t.errors[0].is_nan()).count();
+    let all: usize = trials.iter().map(Vec::len).sum();
+    (close > 0)
+        .then(|| format!("{close} of {all} trials come too near to the reference to be judged: ask for a better one (--reference)"))
+        .into_iter()
+        .collect()
+}
+
+fn scene(stage: &Stage, subject: Option<&Material>, way: Way) -> Result<Scene, ChainError> {
+    let mut stage = stage.clone();
+    if let Way::Depth(events) = way {
+        stage.spec.max_bounces = events;
+    }
+    chain::scene(&stage, subject.cloned())
+}
+
+/// The series of all ways, and one of targets.
+fn design(what: &RenderSweep) -> (Vec<Series>, Vec<Setting<Shot>>) {
+    let (mut series, mut settings) = (Vec::new(), Vec::new());
+    let new = |name: String, knob: Knob, laws: Vec<Option<Law>>| Series {
+        name,
+        knob,
+        cost: Cost::Computer,
+        main: 0,
+        laws,
+        whole: 0.0,
+    };
+    for (way, kind) in what.ways.iter().enumerate() {
+        let of_error = Some(kind.law()).filter(|_| kind.is_unbiased());
+        series.push(new(kind.name(), Knob::Samples, vec![of_error, Some(kind.law()), None, None]));
+        for &samples in &what.samples {
+            let size = f64::from(samples);
+            let text = Knob::Samples.typed(size, 0.0);
+            settings.push(Setting::sized(series.len() - 1, size, text, Shot { way, samples, target: None }));
+        }
+    }
+    if !what.targets.is_empty() {
+        series.push(new("samples where it is noisy".into(), Knob::PictureTarget, vec![None; 4]));
+    }
+    for &target in &what.targets {
+        let shot = Shot { way: 0, samples: 1 << 24, target: Some(target) };
+        let text = Knob::PictureTarget.typed(target, 0.0);
+        settings.push(Setting { promise: Some(target), ..Setting::sized(series.len() - 1, target, text, shot) });
+    }
+    (series, settings)
+}
+
+/// A picture and the time of its rendering, s.
+fn picture(scene: &Scene, way: Way, options: &Options, control: Control<'_>) -> Result<(Image, f64), ChainError> {
+    let shot = |options: &Options| {
+        let film = render::render(scene, &way.options(*options), control)?;
+        Ok::<_, ChainError>((film.to_image(), film.seconds))
+    };
+    if way != Way::Independent || options.samples <= FEW {
+        return shot(options);
+    }
+    let parts = options.samples.div_ceil(FEW);
+    let mut sum: Option<(Image, f64)> = None;
+    for part in 0..parts {
+        let seed = options.seed.wrapping_add(u64::from(part).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let (image, seconds) = shot(&Options { samples: FEW, seed, ..*options })?;
+        match &mut sum {
+            None => sum = Some((image, seconds)),
+            Some((all, time)) => {
+                all.radiance.iter_mut().zip(&image.radiance).for_each(|(a, b)| *a = [0, 1, 2].map(|c| a[c] + b[c]));
+                *time += seconds;
+            }
+        }
+    }
+    let Some((mut image, seconds)) = sum else { return shot(options) };
+    image.radiance.iter_mut().for_each(|p| *p = p.map(|x| x / f64::from(parts)));
+    image.standard_error = None;
+    Ok((image, seconds))
+}

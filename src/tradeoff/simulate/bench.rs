@@ -1,0 +1,255 @@
+//! The trials: readings by a setting beside those that they are measured against.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::SimulateSweep;
+use crate::brdf::{Material, Sight};
+use crate::chain::{ChainError, Source, measure, reduced_until, with_job};
+use crate::control::Control;
+use crate::fit::{FitOptions, fit};
+use crate::gonio::sight::Cones;
+use crate::gonio::{ACCURACY, Instrument, Job, Kind, Raw, Scan};
+use crate::measurement::{Dimension, Measurement};
+use crate::numeric::random::mix;
+use crate::tradeoff::fit::parameter_error;
+use crate::tradeoff::sweep::{Trial, Turn};
+
+/// One way to read.
+#[derive(Debug)]
+pub(super) enum Read {
+    /// Means over cones to this relative error, without noise.
+    Quadrature(f64),
+    /// An effect left out; all of them on where it is none.
+    Without(Option<&'static str>),
+    /// As the instrument reads, noise and all.
+    Noisy { instrument: Box<Instrument>, scan: Scan },
+}
+
+/// Means over cones of the reference.
+const FINEST: f64 = 1e-10;
+/// Share of the full well below which a reading is taken.
+const UNSATURATED: f64 = 0.95;
+/// Effects by chance, anew in every reading.
+const NOISE: [&str; 3] = ["shot noise", "read noise", "quantisation"];
+
+/// Root of the mean of the squared relative changes |x − r|/max(|x|, |r|), over pairs of which both are numbers: each is 1 at most where signs
+/// agree, so that a reading in
+/// a shadow's edge does not hide all others.
+#[must_use]
+pub fn relative_change(values: &[f64], reference: &[f64]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (x, r) in values.iter().zip(reference).filter(|(x, r)| !x.is_nan() && !r.is_nan()) {
+        let larger = x.abs().max(r.abs());
+        sum += if larger > 0.0 { ((x - r) / larger).powi(2) } else { 0.0 };
+        count += 1.0;
+    }
+    f64::sqrt(sum / count)
+}
+
+/// Where trials are made.
+pub(super) struct Bench<'a> {
+    what: &'a SimulateSweep<'a>,
+    seed: u64,
+    control: Control<'a>,
+    /// Readings without noise to the finest accuracy, by round.
+    finest: HashMap<u32, Raw>,
+    /// Readings with all effects but noise, by round.
+    whole: HashMap<(u32, Option<&'static str>), Judged>,
+    /// True values, by scan.
+    truths: HashMap<String, Vec<f64>>,
+    quadrature_error: f64,
+}
+
+/// Readings and what comes of them.
+struct Judged {
+    raw: Raw,
+    values: Vec<f64>,
+    fitted: Option<Material>,
+}
+
+impl<'a> Bench<'a> {
+    pub fn new(what: &'a SimulateSweep<'a>, seed: u64, control: Control<'a>) -> Self {
+        let (finest, whole, truths) = (HashMap::new(), HashMap::new(), HashMap::new());
+        Self { what, seed, control, finest, whole, truths, quadrature_error: 0.0 }
+    }
+
+    /// What the references are.
+    pub fn said(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        if !self.finest.is_empty() {
+            said.push(format!(
+                "quadratures: the same readings with means over cones to {FINEST:.0e}; their last doubling moved them by {:.1e} at most",
+                self.quadrature_error
+            ));
+        }
+        if !self.whole.is_empty() {
+            said.push("effects: the same readings by the same instrument with all effects on, noise only where it is the effect".into());
+        }
+        if !self.truths.is_empty() {
+            said.push(
+                "readings, exposure, step: the material itself, exactly; their noise: the same readings without it"
+                    .into(),
+            );
+        }
+        said
+    }
+
+    /// What a reader must know.
+    pub fn notes(&self) -> Vec<String> {
+        let least = self.what.quadrature.iter().copied().fold(f64::INFINITY, f64::min);
+        let said = format!(
+            "some readings' orders end before {FINEST:.0e}: an error far below {:.0e} may be the reference's",
+            self.quadrature_error
+        );
+        (self.quadrature_error > least).then_some(said).into_iter().collect()
+    }
+
+    pub fn trial(&mut self, read: &Read, turn: Turn) -> Result<Trial, ChainError> {
+        match read {
+            Read::Quadrature(accuracy) => self.quadrature(*accuracy, turn.round),
+            Read::Without(name) => self.without(*name, turn.round),
+            Read::Noisy { instrument, scan } => self.noisy(instrument, scan, turn.seed),
+        }
+    }
+
+    /// Raw readings, and the time that they took, s.
+    fn read(&self, accuracy: f64, left_out: &[&str], seed: u64) -> Result<(Raw, f64), ChainError> {
+        let SimulateSweep { source, name, instrument, scan, .. } = self.what;
+        let quiet = Control { progress: Control::silent().progress, stop: self.control.stop };
+        with_job(name, source, instrument, scan, seed, quiet, |job| {
+            let clock = Instant::now();
+            let raw = Job { accuracy, left_out, ..*job }.run(quiet);
+            (raw, clock.elapsed().as_secs_f64())
+        })
+    }
+
+    /// The same instrument in all settings of a round.
+    fn instrument_of(&self, round: u32) -> u64 {
+        mix(self.seed ^ mix(u64::from(round)))
+    }
+
+    fn quadrature(&mut self, accuracy: f64, round: u32) -> Result<Trial, ChainError> {
+        let seed = self.instrument_of(round);
+        if !self.finest.contains_key(&round) {
+            let (raw, _) = self.read(FINEST, &NOISE, seed)?;
+            self.quadrature_error = self.quadrature_error.max(raw.quadrature_error);
+            self.finest.insert(round, raw);
+        }
+        let (raw, seconds) = self.read(accuracy, &NOISE, seed)?;
+        let error = self.finest.get(&round).map_or(f64::NAN, |finest| of_samples(&raw, finest));
+        Ok(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN] })
+    }
+
+    fn without(&mut self, name: Option<&'static str>, round: u32) -> Result<Trial, ChainError> {
+        let seed = self.instrument_of(round);
+        // Of noise only the one that is looked at.
+        let own = name.filter(|name| NOISE.contains(name));
+        let quiet: Vec<&str> = NOISE.into_iter().filter(|noise| Some(*noise) != own).collect();
+        if !self.whole.contains_key(&(round, own)) {
+            let (raw, _) = self.read(ACCURACY, &quiet, seed)?;
+            let judged = self.judge(raw)?;
+            self.whole.insert((round, own), judged);
+        }
+        let left_out: Vec<&str> = quiet.iter().copied().chain(name).collect();
+        let (raw, seconds) = self.read(ACCURACY, &left_out, seed)?;
+        let less = self.judge(raw)?;
+        let Some(all) = self.whole.get(&(round, own)) else { return Ok(Trial { seconds, errors: vec![f64::NAN; 3] }) };
+        let parameters =
+            less.fitted.as_ref().zip(all.fitted.as_ref()).map_or(f64::NAN, |(less, all)| parameter_error(less, all));
+        let errors = vec![of_samples(&less.raw, &all.raw), relative_change(&less.values, &all.values), parameters];
+        Ok(Trial { seconds, errors })
+    }
+
+    /// Reduces readings and fits the truth's model to them.
+    fn judge(&self, raw: Raw) -> Result<Judged, ChainError> {
+        let table = reduced_until(self.what.name, &raw, self.what.instrument, self.control.stop)?.measurement;
+        let fitted = self.fitted(&table, self.what.instrument);
+        Ok(Judged { raw, values: table.values, fitted })
+    }
+
+    fn fitted(&self, table: &Measurement, instrument: &Instrument) -> Option<Material> {
+        fitted_as(self.what.source, table, instrument)
+    }
+
+    fn noisy(&mut self, instrument: &Instrument, scan: &Scan, seed: u64) -> Result<Trial, ChainError> {
+        let SimulateSweep { source, name, .. } = self.what;
+        let quiet = Control { progress: Control::silent().progress, stop: self.control.stop };
+        let clock = Instant::now();
+        let table = measure(name, source, instrument, scan, seed, quiet)?;
+        let seconds = clock.elapsed().as_secs_f64();
+        let key = scan.to_string();
+        if !self.truths.contains_key(&key) {
+            let ideal = measure(name, source, &Instrument::noiseless(), scan, 0, quiet)?;
+            self.truths.insert(key.clone(), ideal.values);
+        }
+        let truth = self.truths.get(&key).map_or(&[][..], |values| &values[..]);
+        let noise = if instrument.is_plain() {
+            relative_change(&table.values, truth)
+        } else {
+            // The same instrument, with the same errors of its own, with noise and without.
+            let [noisy, calm] = [&[][..], &NOISE].map(|left_out| {
+                with_job(name, source, instrument, scan, seed, quiet, |job| Job { left_out, ..*job }.run(quiet))
+            });
+            noise_of(&noisy?, &calm?, instrument)
+        };
+        let parameters = match (source, self.fitted(&table, instrument)) {
+            (Source::Fitted(truth), Some(fitted)) => parameter_error(&fitted, truth),
+            _ => f64::NAN,
+        };
+        Ok(Trial { seconds, errors: vec![noise, relative_change(&table.values, truth), parameters] })
+    }
+}
+
+/// Fits the truth's model, where it is a sum of lobes, through the instrument's cones where it has any.
+fn fitted_as(source: &Source, table: &Measurement, instrument: &Instrument) -> Option<Material> {
+    let Source::Fitted(truth) = source else { return None };
+    let cones = Cones::of(instrument).filter(|_| table.dimension == Dimension::Space);
+    let through = cones.map(|cones| Arc::new(cones) as Arc<dyn Sight>);
+    let options = FitOptions { through, ..FitOptions::new(truth.model().parse().ok()?) };
+    fit(table, &options).ok().map(|fitted| fitted.material)
+}
+
+/// Noise of readings averaged at each pair of directions, of the longest exposure that does not saturate.
+fn noise_of(noisy: &Raw, calm: &Raw, instrument: &Instrument) -> f64 {
+    let full =
+        if instrument.detector.full_well > 0.0 { UNSATURATED * instrument.detector.full_well } else { f64::INFINITY };
+    // By pair and channel: the exposure, and both sums.
+    let mut longest: BTreeMap<(u32, usize), (f64, f64, f64)> = BTreeMap::new();
+    for (i, reading) in calm.readings.iter().enumerate() {
+        let Some(entry) = reading.entry.filter(|_| reading.kind == Kind::Sample) else { continue };
+        for (c, (x, r)) in noisy.signals(i).iter().zip(calm.signals(i)).enumerate().filter(|(_, (_, r))| **r < full) {
+            let sums = longest.entry((entry, c)).or_insert((0.0, 0.0, 0.0));
+            if reading.exposure_s > sums.0 {
+                *sums = (reading.exposure_s, 0.0, 0.0);
+            }
+            if reading.exposure_s == sums.0 {
+                *sums = (sums.0, sums.1 + x, sums.2 + r);
+            }
+        }
+    }
+    let (noisy, calm): (Vec<f64>, Vec<f64>) = longest.values().map(|sums| (sums.1, sums.2)).unzip();
+    relative_change(&noisy, &calm)
+}
+
+/// Relative change of the readings of the sample.
+fn of_samples(raw: &Raw, reference: &Raw) -> f64 {
+    let of = |raw: &Raw| -> Vec<f64> {
+        let samples = (0..raw.readings.len()).filter(|i| raw.readings[*i].kind == Kind::Sample);
+        samples.flat_map(|i| raw.signals(i).to_vec()).collect()
+    };
+    relative_change(&of(raw), &of(reference))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_relative_to_the_larger_and_leave_out_what_is_not_known() {
+        let found = relative_change(&[1.0, 0.0, f64::NAN, 0.0, -1.0], &[2.0, 3.0, 1.0, 0.0, 1.0]);
+        // ½, 1, –, 0, 2: a change of sign is the only one above 1.
+        assert!((found - ((0.25 + 1.0 + 4.0) / 4.0f64).sqrt()).abs() < 1e-15, "{found}");
+    }
+}

@@ -1,0 +1,185 @@
+//! What accuracy of a simulated measurement costs: orders of quadratures and effects in the computer's time; readings, dwell and step of the scan in
+//! the instrument's.
+
+use std::time::Instant;
+
+use super::curve::{About, Sweep, curves};
+use super::design::{Cost, Law, Measure, Series, Setting, Theory};
+use super::knob::Knob;
+use super::sweep::{Effort, run};
+use crate::chain::{ChainError, Source};
+use crate::control::Control;
+use crate::gonio::{self, Instrument, Scan, lit_rows};
+
+mod bench;
+
+pub use bench::relative_change;
+use bench::{Bench, Read};
+
+/// What is swept.
+#[derive(Debug)]
+pub struct SimulateSweep<'a> {
+    /// What is measured, and what it is called.
+    pub source: &'a Source,
+    /// Its name.
+    pub name: &'a str,
+    /// What it is measured with.
+    pub instrument: &'a Instrument,
+    /// Where.
+    pub scan: &'a Scan,
+    /// Relative errors that means over cones may have, as by `--target-error`.
+    pub quadrature: Vec<f64>,
+    /// Whether each effect is left out in turn.
+    pub effects: bool,
+    /// Readings averaged at each pair of directions.
+    pub readings: Vec<u32>,
+    /// Exposures, as multiples of the instrument's own.
+    pub dwell: Vec<f64>,
+    /// Steps of the scan, degrees, where it has any.
+    pub steps: Vec<f64>,
+}
+
+const MEASURES: [Measure; 3] = [
+    Measure {
+        name: "reading",
+        what: "root mean square of relative changes of readings by the quadrature or the effect that is left out; else by noise, after averages",
+    },
+    Measure {
+        name: "brdf",
+        what: "the same of the reduced BRDF: what the reduction leaves of that; else against the truth",
+    },
+    Measure {
+        name: "parameters",
+        what: "root mean square of relative errors of fitted weights and shapes: likewise; else against the truth",
+    },
+];
+
+const COUNTED: Law = Law { theory: Theory::Exactly(-0.5), why: "noise of independent readings averages out" };
+const EXPOSED: Law = Law { theory: Theory::Exactly(-0.5), why: "shot noise; read noise alone would fall as 1/t" };
+const SAMPLED: Law = Law { theory: Theory::Exactly(-0.5), why: "as many independent readings" };
+
+/// Sweeps the knobs of a simulated measurement.
+///
+/// # Errors
+/// [`ChainError`] where it can't be made or reduced.
+pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<Sweep, ChainError> {
+    let began = Instant::now();
+    let mut bench = Bench::new(what, effort.seed, control);
+    let (series, settings) = design(what);
+    let runs = run(&settings, effort, control, |index, turn| bench.trial(&settings[index].what, turn))?;
+    let found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    let about = About {
+        stage: "simulate",
+        subject: format!("{} along {}", what.name, what.scan),
+        command: format!("goniofit simulate --material {} --scan {}", what.name, what.scan),
+        reference: bench.said(),
+        notes: bench.notes(),
+    };
+    Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
+}
+
+/// One series a knob.
+fn design(what: &SimulateSweep<'_>) -> (Vec<Series>, Vec<Setting<Read>>) {
+    let mut all = Designed { what, series: Vec::new(), settings: Vec::new() };
+    all.of_readings();
+    all.of_quadrature();
+    all.of_effects();
+    (all.series, all.settings)
+}
+
+struct Designed<'a> {
+    what: &'a SimulateSweep<'a>,
+    series: Vec<Series>,
+    settings: Vec<Setting<Read>>,
+}
+
+impl Designed<'_> {
+    fn begin(&mut self, name: &str, knob: Knob, cost: Cost, main: usize, laws: Vec<Option<Law>>) {
+        self.series.push(Series { name: name.into(), knob, cost, main, laws, whole: 0.0 });
+    }
+
+    fn push(&mut self, size: f64, text: String, read: Read) {
+        let instrument_s = match &read {
+            Read::Noisy { instrument, scan } => scan
+                .directions()
+                .map(|(directions, _)| gonio::seconds(instrument, &directions, &lit_rows(&directions, scan.rows()))),
+            _ => None,
+        };
+        let setting = Setting::sized(self.series.len() - 1, size, text, read);
+        self.settings.push(Setting { instrument_s, ..setting });
+    }
+
+    /// What the instrument's time is spent on.
+    fn of_readings(&mut self) {
+        let SimulateSweep { instrument, scan, readings, dwell, steps, source, .. } = self.what;
+        let main = if matches!(source, Source::Fitted(_)) { 2 } else { 1 };
+        // What readings share does not average out.
+        let is_plain = instrument.is_plain();
+        let laws = |law| vec![Some(law), Some(law).filter(|_| is_plain), Some(law).filter(|_| is_plain)];
+        let noisy =
+            |instrument: Instrument, scan: &Scan| Read::Noisy { instrument: Box::new(instrument), scan: scan.clone() };
+        if !readings.is_empty() {
+            self.begin("readings averaged", Knob::Readings, Cost::Instrument, main, laws(COUNTED));
+        }
+        for &n in readings {
+            let more = Instrument { readings: n, ..(*instrument).clone() };
+            self.push(f64::from(n), Knob::Readings.typed(f64::from(n), 0.0), noisy(more, scan));
+        }
+        if !dwell.is_empty() {
+            self.begin("exposure", Knob::Dwell, Cost::Instrument, main, laws(EXPOSED));
+        }
+        for &factor in dwell {
+            let mut longer = (*instrument).clone();
+            longer.detector.exposures_s.iter_mut().for_each(|s| *s *= factor);
+            self.push(factor, Knob::Dwell.typed(factor, 0.0), noisy(longer, scan));
+        }
+        if !steps.is_empty() {
+            let laws = vec![None, None, Some(SAMPLED).filter(|_| is_plain)];
+            self.begin("step of the scan", Knob::Step, Cost::Instrument, main, laws);
+        }
+        for &step in steps {
+            let Some((finer, pairs)) = stepped(scan, step) else { continue };
+            let text = format!("--scan {finer}");
+            self.push(pairs, text, noisy((*instrument).clone(), &finer));
+        }
+    }
+
+    fn of_quadrature(&mut self) {
+        if self.what.quadrature.is_empty() {
+            return;
+        }
+        self.begin("means over cones", Knob::Quadrature, Cost::Computer, 0, vec![None; 3]);
+        for &accuracy in &self.what.quadrature {
+            self.push(accuracy, Knob::Quadrature.typed(accuracy, 0.0), Read::Quadrature(accuracy));
+            if let Some(setting) = self.settings.last_mut() {
+                setting.promise = Some(accuracy);
+            }
+        }
+    }
+
+    fn of_effects(&mut self) {
+        let plan = gonio::plan(self.what.instrument, self.what.source.channels());
+        let on: Vec<&'static str> = plan.effects.iter().filter(|e| e.on).map(|e| e.name).collect();
+        if !self.what.effects || on.is_empty() {
+            return;
+        }
+        self.begin("an effect left out", Knob::Effects, Cost::Computer, 0, vec![None; 3]);
+        let series = self.series.len() - 1;
+        self.settings.push(Setting::named(series, "all effects".into(), Read::Without(None)));
+        let without = |name| Setting::named(series, format!("without {name}"), Read::Without(Some(name)));
+        self.settings.extend(on.into_iter().map(without));
+    }
+}
+
+/// The scan with another step, and how many pairs of directions above the horizon it has; `None` of one without a step.
+fn stepped(scan: &Scan, step_deg: f64) -> Option<(Scan, f64)> {
+    let finer = match scan {
+        Scan::InPlane { .. } => Scan::InPlane { step_deg },
+        Scan::Hemisphere { .. } => Scan::Hemisphere { step_deg },
+        Scan::Flat { .. } => Scan::Flat { step_deg },
+        _ => return None,
+    };
+    let (directions, _) = finer.directions()?;
+    let pairs = lit_rows(&directions, &[]).len() as f64;
+    Some((finer, pairs))
+}

@@ -1,0 +1,176 @@
+//! The sweep: trials of all settings, round after round, in an order that drifts of the machine do not favour.
+
+use std::time::{Duration, Instant};
+
+use super::design::Setting;
+use crate::control::Control;
+use crate::numeric::random::mix;
+
+/// What one trial told.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Trial {
+    /// Wall-clock time of the work itself, s.
+    pub seconds: f64,
+    /// The errors, measure by measure; NaN where one could not be told.
+    pub errors: Vec<f64>,
+}
+
+/// How much is tried.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Trials of each setting.
+    pub trials: u32,
+    /// Key of all seeds.
+    pub seed: u64,
+    /// When the sweep has to be over.
+    pub deadline: Option<Instant>,
+}
+
+/// Which trial it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Turn {
+    /// Which round, the same for all settings.
+    pub round: u32,
+    /// A seed that no other trial has.
+    pub seed: u64,
+}
+
+/// What came of the trials of every setting, and why there are not all of them, where that is so.
+#[derive(Debug, Default)]
+pub(super) struct Runs {
+    pub trials: Vec<Vec<Trial>>,
+    pub ended: Option<String>,
+}
+
+/// A series' first setting is tried once more, without counting, where it takes less than this: what is made once (tables, threads, pages of memory)
+/// would be a large part of that.
+const WARM: Duration = Duration::from_millis(500);
+
+/// Tries every setting in every round. `trial` gets the setting's index.
+///
+/// # Errors
+/// What `trial` returns.
+pub(super) fn run<S, E>(
+    settings: &[Setting<S>],
+    effort: &Effort,
+    control: Control<'_>,
+    mut trial: impl FnMut(usize, Turn) -> Result<Trial, E>,
+) -> Result<Runs, E> {
+    let count = settings.len();
+    let mut runs = Runs { trials: vec![Vec::new(); count], ended: None };
+    let mut lasted: Vec<Option<Duration>> = vec![None; count];
+    control.progress.start("trials", u64::from(effort.trials) * count as u64);
+    'rounds: for round in 0..effort.trials {
+        // There and back, so that what grows warm or busy does so for small and large sizes alike.
+        let order: Vec<usize> = if round % 2 == 0 { (0..count).collect() } else { (0..count).rev().collect() };
+        for index in order {
+            if control.stop.requested() {
+                runs.ended = Some("stopped".into());
+                break 'rounds;
+            }
+            if effort.deadline.is_some_and(|end| is_late(end, predicted(settings, &lasted, index))) {
+                runs.ended = Some("the time ended it".into());
+                control.progress.advance(1);
+                continue;
+            }
+            let seed = |again: u64| mix(effort.seed ^ mix(u64::from(round) << 32 | (index as u64) << 1 | again));
+            let turn = |again: u64| Turn { round, seed: seed(again) };
+            let is_first = round == 0 && (index == 0 || settings[index].series != settings[index - 1].series);
+            let mut began = Instant::now();
+            let mut found = trial(index, turn(0))?;
+            if is_first && began.elapsed() < WARM {
+                began = Instant::now();
+                found = trial(index, turn(1))?;
+            }
+            if control.stop.requested() {
+                runs.ended = Some("stopped".into());
+                break 'rounds; // half a trial says nothing
+            }
+            lasted[index] = Some(began.elapsed());
+            runs.trials[index].push(found);
+            control.progress.advance(1);
+        }
+    }
+    control.progress.finish();
+    Ok(runs)
+}
+
+fn is_late(end: Instant, needed: Duration) -> bool {
+    end.saturating_duration_since(Instant::now()) <= needed
+}
+
+/// How long a trial may take: as long as the last one, or in proportion to the size of the largest one known of the series.
+fn predicted<S>(settings: &[Setting<S>], lasted: &[Option<Duration>], index: usize) -> Duration {
+    if let Some(known) = lasted[index] {
+        return known;
+    }
+    let alike = |k: &usize| settings[*k].series == settings[index].series;
+    let known = (0..settings.len()).filter(alike).filter_map(|k| Some((settings[k].size?, lasted[k]?)));
+    let (Some((size, time)), Some(own)) = (known.max_by(|a, b| a.0.total_cmp(&b.0)), settings[index].size) else {
+        return Duration::ZERO;
+    };
+    time.mul_f64((own / size).clamp(0.0, 1e6))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{Progress, Quiet, Stop};
+
+    fn settings(sizes: &[f64]) -> Vec<Setting<()>> {
+        sizes.iter().map(|size| Setting::sized(0, *size, String::new(), ())).collect()
+    }
+
+    fn effort(trials: u32, deadline: Option<Instant>) -> Effort {
+        Effort { trials, seed: 7, deadline }
+    }
+
+    #[test]
+    fn every_trial_has_a_seed_of_its_own_and_the_first_is_warmed_up() {
+        let mut seen = Vec::new();
+        let runs = run::<_, ()>(&settings(&[1.0, 2.0, 4.0]), &effort(4, None), Control::silent(), |index, turn| {
+            seen.push((index, turn.seed));
+            Ok(Trial { seconds: 1.0, errors: vec![index as f64] })
+        })
+        .expect("runs");
+        assert_eq!(runs.ended, None);
+        assert!(runs.trials.iter().enumerate().all(|(i, t)| t.len() == 4 && t.iter().all(|t| t.errors[0] == i as f64)));
+        let order: Vec<usize> = seen.iter().map(|s| s.0).collect();
+        assert_eq!(order, [0, 0, 1, 2, 2, 1, 0, 0, 1, 2, 2, 1, 0], "one warm-up, then there and back");
+        let mut seeds: Vec<u64> = seen.iter().map(|s| s.1).collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        assert_eq!(seeds.len(), seen.len());
+    }
+
+    #[test]
+    fn what_would_end_too_late_is_not_begun() {
+        let end = Instant::now() + Duration::from_millis(200);
+        let runs = run::<_, ()>(&settings(&[1.0, 1e6]), &effort(3, Some(end)), Control::silent(), |index, _| {
+            assert_eq!(index, 0, "a million times as long as the first");
+            std::thread::sleep(Duration::from_millis(5));
+            Ok(Trial { seconds: 1.0, errors: vec![] })
+        })
+        .expect("runs");
+        assert_eq!((runs.trials[0].len(), runs.trials[1].len()), (3, 0));
+        assert!(runs.ended.is_some());
+    }
+
+    #[test]
+    fn a_stop_keeps_the_trials_that_are_whole() {
+        let stop = Stop::new();
+        let progress: &dyn Progress = &Quiet;
+        let mut done = 0;
+        let runs = run::<_, ()>(&settings(&[1.0]), &effort(10, None), Control { progress, stop: &stop }, |_, _| {
+            done += 1;
+            if done == 4 {
+                stop.request();
+            }
+            Ok(Trial { seconds: 1.0, errors: vec![] })
+        })
+        .expect("runs");
+        // The warm-up does not count, and the one that was stopped is not whole.
+        assert_eq!(runs.trials[0].len(), 2);
+        assert!(runs.ended.is_some_and(|why| why.contains("stopped")));
+    }
+}

@@ -1,0 +1,210 @@
+//! `tradeoff`: curves, their slopes, files, advice. All that is tested is the same whatever the clock says.
+
+use serde_json::Value;
+
+use crate::bench::{Bench, number};
+
+fn curve<'a>(found: &'a Value, name: &str) -> &'a Value {
+    let curves = found["curves"].as_array().expect("curves");
+    curves.iter().find(|c| c["name"] == name).unwrap_or_else(|| panic!("{name} is not among the curves of {found}"))
+}
+
+/// The index of a measure.
+fn measure(found: &Value, name: &str) -> usize {
+    let measures = found["measures"].as_array().expect("measures");
+    measures.iter().position(|m| m["name"] == name).expect("a measure")
+}
+
+fn errors(found: &Value, curve_name: &str, name: &str) -> Vec<f64> {
+    let m = measure(found, name);
+    let points = curve(found, curve_name)["points"].as_array().expect("points");
+    points.iter().map(|p| number(&p["errors"][m]["value"])).collect()
+}
+
+fn slope(found: &Value, curve_name: &str, name: &str) -> f64 {
+    let slopes = curve(found, curve_name)["slopes"].as_array().expect("slopes");
+    number(&slopes.iter().find(|s| s["measure"] == name).expect("a slope")["slope"]["value"])
+}
+
+/// What does not depend on the clock.
+fn timeless(found: &Value) -> Vec<Value> {
+    let curves = found["curves"].as_array().expect("curves");
+    let points = curves.iter().flat_map(|c| c["points"].as_array().expect("points"));
+    points.map(|p| p["errors"].clone()).collect()
+}
+
+#[test]
+fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
+    let b = Bench::new();
+    b.ok(&["simulate", "--material", "glossy-paint", "--seed", "3", "--out", "paint.csv"]);
+    let args =
+        ["tradeoff", "fit", "paint.csv", "--parts", "1,10,20,40", "--targets", "1%", "--trials", "24", "--out", "t"];
+    let found = b.json(&args);
+    let excess = errors(&found, "lambert+phong", "excess");
+    assert_eq!(excess.last(), Some(&0.0), "the fit to all is the reference: {excess:?}");
+    assert!(excess[0] > excess[1] && excess[1] > excess[2], "{excess:?}");
+    let [parameters, of_cost] = ["parameters", "excess"].map(|name| slope(&found, "lambert+phong", name));
+    // Of 24 trials each an error is known to 10 to 15 %, and the sizes differ by a factor of 4: the slope to about 0.1, of the square twice that.
+    assert!((parameters + 0.5).abs() < 0.2 && (of_cost + 1.0).abs() < 0.4, "{parameters} and {of_cost}");
+    let target = &curve(&found, "lambert+phong, as many as a target takes")["points"][0];
+    assert_eq!(target["kept"], 24);
+    for name in ["tradeoff.csv", "tradeoff.json", "excess-time.svg", "excess-time.png", "parameters-part.svg"] {
+        assert!(!b.bytes(&format!("t/{name}")).is_empty(), "{name}");
+    }
+    assert_eq!(timeless(&b.json_file("t/tradeoff.json")), timeless(&found));
+    let csv = b.text("t/tradeoff.csv");
+    let rows = csv.lines().filter(|l| !l.starts_with('#')).count();
+    assert_eq!(rows, 1 + 5, "{csv}");
+    let text = b.ok(&[&args[..], &["--advise", "excess=20%"]].concat()).text();
+    assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
+    assert!(text.contains("goniofit fit paint.csv --part"), "{text}");
+}
+
+#[test]
+fn independent_samples_have_their_slope_and_a_cut_path_its_bias_whatever_the_threads() {
+    let b = Bench::new();
+    let args = [
+        "tradeoff",
+        "render",
+        "--scene",
+        "sphere-on-plane",
+        "--size",
+        "24",
+        "--samples",
+        "8,32,128",
+        "--trials",
+        "6",
+        "--ways",
+        "scene,independent",
+        "--depths",
+        "1",
+        "--seed",
+        "5",
+    ];
+    let found = b.json(&args);
+    let independent = slope(&found, "independent samples", "error");
+    assert!((independent + 0.5).abs() < 0.05, "{independent}");
+    assert!(slope(&found, "plan of the scene", "error") < independent, "Sobol' points are more even");
+    let m = measure(&found, "bias");
+    let bias = |name: &str| curve(&found, name)["points"][2]["errors"][m].clone();
+    assert_eq!(number(&bias("plan of the scene")["low"]), 0.0, "{}", bias("plan of the scene"));
+    assert!(number(&bias("max_bounces = 1")["low"]) > 0.01, "{}", bias("max_bounces = 1"));
+    let again = b.json(&[&args[..], &["--threads", "1"]].concat());
+    assert_eq!(timeless(&again), timeless(&found));
+}
+
+#[test]
+fn readings_average_out_and_take_the_instruments_time() {
+    let b = Bench::new();
+    let args = [
+        "tradeoff",
+        "simulate",
+        "--material",
+        "satin",
+        "--scan",
+        "hemisphere:15",
+        "--knobs",
+        "readings",
+        "--average",
+        "1,4,16",
+        "--trials",
+        "12",
+    ];
+    let found = b.json(&args);
+    for name in ["reading", "brdf", "parameters"] {
+        let slope = slope(&found, "readings averaged", name);
+        let most = if name == "parameters" { 0.15 } else { 0.05 };
+        assert!((slope + 0.5).abs() < most, "{name}: {slope}");
+    }
+    let points = curve(&found, "readings averaged")["points"].as_array().expect("points");
+    let times: Vec<f64> = points.iter().map(|p| number(&p["instrument_s"])).collect();
+    assert!((times[2] / times[0] - 16.0).abs() < 1e-9, "{times:?}");
+}
+
+#[test]
+fn means_over_cones_are_as_good_as_they_are_asked_for_and_effects_have_their_size() {
+    let b = Bench::new();
+    let args = [
+        "tradeoff",
+        "simulate",
+        "--material",
+        "satin",
+        "--instrument",
+        "commercial",
+        "--scan",
+        "in-plane:15",
+        "--knobs",
+        "quadrature,effects",
+        "--trials",
+        "2",
+        "--target-errors",
+        "1e-2,1e-6",
+    ];
+    let found = b.json(&args);
+    let points = curve(&found, "means over cones")["points"].as_array().expect("points");
+    assert!(points.iter().all(|p| p["kept"] == 2), "{points:?}");
+    let names: Vec<&str> = curve(&found, "an effect left out")["points"]
+        .as_array()
+        .expect("points")
+        .iter()
+        .map(|p| p["setting"].as_str().expect("a name"))
+        .collect();
+    let readings = errors(&found, "an effect left out", "reading");
+    let of = |name: &str| readings[names.iter().position(|n| *n == name).expect("an effect")];
+    assert_eq!(of("all effects"), 0.0);
+    assert!(of("without detector aperture") > 1e-5 && of("without shot noise") > 1e-3, "{names:?} {readings:?}");
+}
+
+#[test]
+fn the_whole_chain_is_off_by_what_its_links_say() {
+    let b = Bench::new();
+    let args = [
+        "tradeoff",
+        "chain",
+        "--material",
+        "satin",
+        "--scan",
+        "hemisphere:15",
+        "--electrons",
+        "300",
+        "--size",
+        "24",
+        "--average",
+        "1,4",
+        "--strides",
+        "1,3",
+        "--samples",
+        "16,64",
+        "--trials",
+        "6",
+        "--budget",
+        "10h",
+    ];
+    let found = b.json(&args);
+    let share = &found["chain"][0];
+    assert_eq!((number(&share["readings"]), number(&share["stride"]), number(&share["samples"])), (4.0, 1.0, 64.0));
+    let predicted = number(&share["from_data"]).hypot(number(&share["from_pixels"]));
+    let measured = number(&share["measured"]["value"]);
+    assert!((measured / predicted - 1.0).abs() < 0.2, "{measured} of {predicted}");
+}
+
+#[test]
+fn what_can_t_be_had_is_said() {
+    let b = Bench::new();
+    b.paint("paint.csv");
+    let fit = ["tradeoff", "fit", "paint.csv", "--parts", "3,5", "--trials", "2", "--targets", "1%"];
+    let render = ["tradeoff", "render", "--size", "8", "--samples", "4,8", "--trials", "2", "--ways", "scene"];
+    let ran = b.run(&[&render[..], &["--advise", "error=1e-9", "--json"]].concat());
+    assert_eq!(ran.code, Some(1));
+    let found = ran.json();
+    assert!(found["error"].as_str().is_some_and(|e| e.contains("--samples 8")), "{found}");
+    assert!(found["advice"][0]["advice"].is_null() && found["curves"][0]["points"].is_array(), "{found}");
+    let ran = b.run(&[&fit[..], &["--advise", "error"]].concat());
+    assert_eq!(ran.code, Some(2));
+    let ran = b.run(&[&fit[..], &["--time-budget", "1us"]].concat());
+    assert!(ran.code == Some(1) && ran.err.contains("more time"), "{}", ran.err);
+    let ran = b.run(&["tradeoff", "chain", "--material", "paint.csv"]);
+    assert!(ran.code == Some(2) && ran.err.contains("measurement"), "{}", ran.err);
+    let ran = b.run(&["tradeoff", "simulate", "--material", "satin", "--scan", "adaptive"]);
+    assert!(ran.code == Some(2) && ran.err.contains("adaptive"), "{}", ran.err);
+}
