@@ -40,6 +40,7 @@ pub struct Bootstrap {
 
 /// Options of [`super::fit`].
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_excessive_bools)] // options, each on its own
 pub struct FitOptions {
     /// The model.
     pub model: ModelSpec,

@@ -118,7 +118,8 @@ impl Cones {
                 // A table errs as much as the lobe is high within a piece of it; pieces are wider the farther off they are.
                 let nearer = (alpha - PIECES / n.sqrt()).min(outer + APART * (alpha - outer)).max(0.0);
                 let seen = self.seen(n);
-                let [here, near, peak] = [alpha, nearer, 0.0].map(|alpha| self.read(&seen, n, alpha, ratio).0);
+                let [here, near, peak] =
+                    [alpha, nearer, 0.0].map(|alpha| self.read(seen.as_deref(), n, alpha, ratio).0);
                 *out += term.weight[c] * here;
                 off[c] += term.weight[c] * (TABLED * near + ROUNDED * peak);
             }
@@ -142,7 +143,7 @@ impl Cones {
                 let Some(shape) = term.shape_of(c) else { continue };
                 let value = match shape[..] {
                     [n] if n == last.0 => last.1,
-                    [n] => views.read(n, &self.seen(n)).0,
+                    [n] => views.read(n, self.seen(n).as_deref()).0,
                     _ => term.kind.lobe().value(&[], 0.0, &mut []),
                 };
                 last = (shape.first().copied().unwrap_or(f64::NAN), value);
@@ -162,17 +163,14 @@ impl Cones {
     }
 
     /// A lobe of weight 1 as it is read from one point of the spot at α, q = cosθi/cosθo being `q`, 1/sr, and its derivative by n.
-    fn read(&self, seen: &Option<Arc<Seen>>, n: f64, alpha: f64, q: f64) -> (f64, f64) {
-        let (value, slope) = match seen {
-            Some(seen) => {
+    fn read(&self, seen: Option<&Seen>, n: f64, alpha: f64, q: f64) -> (f64, f64) {
+        let [value, slope] = seen.map_or_else(
+            || power_of_alpha(n, alpha),
+            |seen| {
                 let [u, w, du, dw] = seen.at(alpha);
-                (u + q * w, du + q * dw)
-            }
-            None => {
-                let [value, slope] = power_of_alpha(n, alpha);
-                (value, slope)
-            }
-        };
+                [u + q * w, du + q * dw]
+            },
+        );
         let scale = 1.0 / (TAU * self.mean_cos());
         ((n + 2.0) * scale * value, ((n + 2.0) * slope + value) * scale)
     }
@@ -198,7 +196,7 @@ impl<'a> Views<'a> {
     }
 
     /// The mean of [`Cones::read`] over the spot, what reflects more light counting more; that of the middle where the spot has no extent.
-    fn read(&mut self, n: f64, seen: &Option<Arc<Seen>>) -> (f64, f64) {
+    fn read(&mut self, n: f64, seen: Option<&Seen>) -> (f64, f64) {
         let (cones, place) = (self.cones, self.place);
         let Some(spot) = &cones.spot else { return cones.read(seen, n, place.alpha, place.ratio) };
         let order = self.order(spot, n);
@@ -278,7 +276,7 @@ impl Sight for Cones {
         };
         let seen = self.seen(n);
         for (i, place) in places.iter().enumerate() {
-            (values[i], slopes[i]) = Views::new(self, *place).read(n, &seen);
+            (values[i], slopes[i]) = Views::new(self, *place).read(n, seen.as_deref());
         }
     }
 }

@@ -11,7 +11,7 @@
 pub(super) mod outline;
 
 use std::f64::consts::{PI, TAU};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
@@ -33,15 +33,13 @@ const NEAREST: f64 = 0.9;
 type Pair = (DVec3, DVec3);
 
 /// The spot of an instrument.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
     footprint: Footprint,
     /// 1/m; 0 is far away.
     source: f64,
     detector: f64,
     dimension: Dimension,
-    /// Of each order that was asked for.
-    rules: Arc<Mutex<Vec<(usize, Arc<Rule>)>>>,
 }
 
 /// One order: where on the way from the middle to the edge, the share of its square, and what it counts; steps of a whole edge.
@@ -49,6 +47,19 @@ pub(super) struct Spot {
 struct Rule {
     way: Vec<(f64, f64)>,
     steps: Vec<f64>,
+}
+
+impl Rule {
+    /// The one of order `m`, [`FINEST`] at most.
+    fn of(m: usize) -> &'static Self {
+        static RULES: [OnceLock<Rule>; FINEST + 1] = [const { OnceLock::new() }; FINEST + 1];
+        let m = m.min(FINEST);
+        RULES[m].get_or_init(|| {
+            let way = gauss_legendre(m).iter().map(|(x, w)| ((0.5 * (1.0 + x)).sqrt(), 0.5 * w)).collect();
+            let around = 2 * m + 2;
+            Self { way, steps: (0..around).map(|k| TAU * k as f64 / around as f64).collect() }
+        })
+    }
 }
 
 /// A point of the spot as it sees source and detector.
@@ -66,26 +77,7 @@ impl Spot {
         let near = |distance: f64| if distance > 0.0 { 1.0 / distance } else { 0.0 };
         let (source, detector) = (near(instrument.source.distance_m), near(instrument.detector.distance_m));
         let matters = instrument.source.beam_diameter_m > 0.0 && source + detector > 0.0;
-        matters.then(|| Self {
-            footprint: Footprint::of_beam(instrument, dimension),
-            source,
-            detector,
-            dimension,
-            rules: Arc::default(),
-        })
-    }
-
-    fn rule(&self, m: usize) -> Arc<Rule> {
-        let mut rules = self.rules.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, rule)) = rules.iter().find(|(of, _)| *of == m) {
-            return Arc::clone(rule);
-        }
-        let way = gauss_legendre(m).iter().map(|(x, w)| ((0.5 * (1.0 + x)).sqrt(), 0.5 * w)).collect();
-        let around = 2 * m + 2;
-        let steps = (0..around).map(|k| TAU * k as f64 / around as f64).collect();
-        let rule = Arc::new(Rule { way, steps });
-        rules.push((m, Arc::clone(&rule)));
-        rule
+        matters.then(|| Self { footprint: Footprint::of_beam(instrument, dimension), source, detector, dimension })
     }
 
     /// Calls `add` with the points of the rule of order `m`; their shares of the spot add up to 1. None below the horizon.
@@ -102,7 +94,7 @@ impl Spot {
             gauss_legendre(2 * m).iter().for_each(|(x, w)| at(DVec3::X * (half * x), 0.5 * w));
             return;
         }
-        let (rule, edge) = (self.rule(m), self.footprint.edge(wi, wo));
+        let (rule, edge) = (Rule::of(m), self.footprint.edge(wi, wo));
         let area: f64 = edge.iter().map(Piece::area).sum();
         for piece in &edge {
             let mut ring = |own: f64, share: f64| {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::brdf::lobe::MAX_PARAMETERS;
-use crate::brdf::{Brdf, Material, Reflectance, Sight};
+use crate::brdf::{Brdf, Material, Place, Reflectance, Sight};
 
 /// A material to be compared with readings.
 #[derive(Debug, Clone)]
@@ -50,8 +50,8 @@ impl Predicted {
     }
 
     fn seen(&self, sight: &dyn Sight, pairs: &[(DVec3, DVec3)]) -> Vec<Vec<f64>> {
-        let places: Vec<Option<[f64; 2]>> = pairs.iter().map(|(wi, wo)| sight.place(*wi, *wo)).collect();
-        let known: Vec<[f64; 2]> = places.iter().flatten().copied().collect();
+        let places: Vec<Option<Place>> = pairs.iter().map(|(wi, wo)| sight.place(*wi, *wo)).collect();
+        let known: Vec<Place> = places.iter().flatten().copied().collect();
         let mut sums = vec![vec![0.0; known.len()]; self.material.channels.len()];
         for term in &self.material.lobes {
             for (c, sum) in sums.iter_mut().enumerate() {
