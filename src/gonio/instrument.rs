@@ -97,6 +97,7 @@ impl Instrument {
             self.surroundings.fault(),
             self.protocol.fault(),
             self.height_fault(),
+            self.beam_fault(),
         ];
         none().or_else(|| parts.into_iter().flatten().next())
     }
@@ -110,6 +111,18 @@ impl Instrument {
             "instrument.sample.height_u_m: expected a tenth of instrument.{part}.distance_m = {} at most, found {}",
             shown(distance),
             shown(height)
+        ))
+    }
+
+    /// A beam as wide as source or detector are far would reach up to them.
+    fn beam_fault(&self) -> Option<String> {
+        let beam = self.source.beam_diameter_m;
+        let far = [("source", self.source.distance_m), ("detector", self.detector.distance_m)];
+        let (part, distance) = far.into_iter().find(|(_, distance)| *distance > 0.0 && beam > *distance)?;
+        Some(format!(
+            "instrument.source.beam_diameter_m: expected instrument.{part}.distance_m = {} at most, found {}",
+            shown(distance),
+            shown(beam)
         ))
     }
 

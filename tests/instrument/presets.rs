@@ -105,7 +105,7 @@ fn what_a_study_expects_is_what_the_instrument_reads() {
 }
 
 /// A share of 0.95 over 100 instruments scatters by 2.2 %, and so does the mean over readings where errors that an instrument keeps make all hold or
-/// miss together; four such steps are allowed. Those of lobes, whose reduction takes seconds, are drawn 36 times. The whole study is
+/// miss together; four such steps are allowed, which only shows gross faults: what is quoted comes from the bench. Those of lobes, whose reduction takes seconds, are drawn 36 times. The whole study is
 /// `benches/instrument_coverage.rs`. Parameters are those of fits through the instrument: at face value an aperture biases an exponent.
 #[test]
 fn intervals_of_every_built_in_instrument_hold_the_truth() {

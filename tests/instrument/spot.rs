@@ -87,6 +87,7 @@ fn the_spot_fades_as_its_square() {
 
 /// The mean over a spot by random points of its own, straight from the geometry: flux through the detector's disc over that of a small spot.
 fn by_chance(material: &Material, instrument: &Instrument, (wi, wo): (DVec3, DVec3), count: usize) -> (f64, f64) {
+    // Over all of the beam: what misses the sample is nothing.
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(7);
     let (beam, sample) = (0.5 * instrument.source.beam_diameter_m, 0.5 * instrument.sample.diameter_m);
     let (source, detector) = (wi * instrument.source.distance_m, wo * instrument.detector.distance_m);
@@ -96,10 +97,13 @@ fn by_chance(material: &Material, instrument: &Instrument, (wi, wo): (DVec3, DVe
     while inside < count {
         let p = DVec3::new((2.0 * rng.random::<f64>() - 1.0) * half, (2.0 * rng.random::<f64>() - 1.0) * half, 0.0);
         let across = p - wi * p.dot(wi);
-        if across.length() > beam || sample > 0.0 && p.length() > sample {
+        if across.length() > beam {
             continue;
         }
         inside += 1;
+        if sample > 0.0 && p.length() > sample {
+            continue;
+        }
         let (to_source, to_detector) = (source - p, detector - p);
         let (i, o) = (to_source.normalize(), to_detector.normalize());
         // Irradiance of a beam that is even across it; the detector's solid angle; both over those of the middle.
@@ -131,8 +135,7 @@ fn readings_are_what_random_points_say() {
     {
         let instrument = near(0.02, 0.4, 0.3, sample, 0.0);
         let material = phong(n);
-        // The share of the beam on the sample is the footprint's matter.
-        let raw = with_job(&material, &instrument, &list(&[pair]), 1, &["footprint"], |job| job.run(Control::silent()));
+        let raw = with_job(&material, &instrument, &list(&[pair]), 1, &[], |job| job.run(Control::silent()));
         let (mean, sigma) = by_chance(&material, &instrument, pair, 400_000);
         let z = (raw.signal[0] - mean) / sigma;
         println!("spot {k}: {:.6e} against {mean:.6e}, {z:.2} sigma of {:.1e}", raw.signal[0], sigma / mean);
@@ -206,4 +209,26 @@ fn a_fit_through_the_spot_finds_the_exponent_that_a_plain_one_misses() {
     let (plain, through) = (exponent(&plain), exponent(&through));
     println!("n = 2000: {plain:.2} at face value, {through:.6} through the spot");
     assert!(plain < 1900.0 && (through / 2000.0 - 1.0).abs() < 1e-5, "{plain} {through}");
+}
+
+/// A spot that nothing cuts grows with grazing incidence until it reaches up to the detector: such readings are masked with the reason, and no instrument whose beam is
+/// wider than that is taken.
+#[test]
+fn a_spot_that_reaches_up_to_the_detector_is_refused() {
+    let matte = Material::new(vec!["y".into()], vec![(LobeKind::Lambert, vec![0.5], vec![])]);
+    let at = |theta: f64| {
+        let direction = goniofit::geometry::angles::direction_deg;
+        (direction(theta, 180.0), direction(20.0, 0.0))
+    };
+    let (instrument, scan) = (near(0.02, 0.0, 0.1, 0.0, 0.0), list(&[at(60.0), at(83.0), at(85.0), at(89.0)]));
+    let raw = read_nominal(&matte, &instrument, &scan);
+    let m = reduced(&raw, &instrument, &matte).measurement;
+    assert!((m.values[0] * std::f64::consts::PI / 0.5 - 1.0).abs() < 1e-6, "{:?}", m.values);
+    assert!((m.values[1] * std::f64::consts::PI / 0.5 - 1.0).abs() < 1e-4, "{:?}", m.values);
+    assert!(m.values[2..].iter().all(|v| v.is_nan()) && m.notes.iter().any(|n| n.contains("2 pairs")), "{:?}", m.notes);
+    let wide = near(0.2, 0.0, 0.1, 0.0, 0.0).fault().expect("refused");
+    assert!(
+        wide.contains("instrument.source.beam_diameter_m: expected instrument.detector.distance_m = 0.1"),
+        "{wide}"
+    );
 }

@@ -21,7 +21,7 @@ pub(super) const EFFECT: Entry = Entry {
         }
         what => Ok(format!("a beam of {} m on {what}", i.source.beam_diameter_m)),
     },
-    remove: |i| i.source.beam_diameter_m = 0.0,
+    remove: |i| (i.sample.diameter_m, i.detector.field_diameter_m) = (0.0, 0.0),
     make: |maker: &Maker<'_>| Footprint::of(maker.instrument, maker.dimension).map(|f| Box::new(f) as Box<dyn Pass>),
 };
 

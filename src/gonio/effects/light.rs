@@ -25,7 +25,9 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     let instrument = maker.instrument;
     let source = unless_out(instrument.source.half_angle(), super::divergence::EFFECT.name);
     let detector = unless_out(instrument.detector.half_angle(), super::aperture::EFFECT.name);
-    let spot = Spot::of(instrument, maker.dimension).filter(|_| !left_out.contains(&super::spot::EFFECT.name));
+    let uncut = left_out.contains(&super::footprint::EFFECT.name);
+    let lit = if uncut { &super::without(instrument, super::footprint::EFFECT.name) } else { instrument };
+    let spot = Spot::of(lit, maker.dimension).filter(|_| !left_out.contains(&super::spot::EFFECT.name));
     let light = Light {
         gain: instrument.gain(),
         truth: maker.truth,
@@ -195,7 +197,11 @@ impl Spread<'_> {
 
     /// Writes the mean over the spot, and returns its error: orders double from where a lobe's peak can't fall between the points.
     fn over(&self, spot: &Spot, kind: Kind, pair: (DVec3, DVec3), late: Option<&Cones>, out: &mut [f64]) -> f64 {
-        let smear = spot.smear(pair);
+        if !spot.is_within(pair) {
+            out.fill(f64::NAN); // no such beam
+            return 0.0;
+        }
+        let smear = spot.view(pair).smear;
         let mut f = vec![0.0; out.len()];
         let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
             self.light.add(kind, (wi, wo), weight, &mut f, out);
@@ -228,7 +234,8 @@ impl Spread<'_> {
             before.copy_from_slice(out);
             order *= 2;
         };
-        let missed = if needed > FINEST { 1.0 } else { 0.0 };
+        // A peak between the points of the last order is not known at all.
+        let missed = if needed > order { 1.0 } else { 0.0 };
         (change + inner).max(missed)
     }
 }

@@ -22,7 +22,7 @@ mod shot;
 mod spot;
 mod stray;
 pub(super) mod tilt;
-mod zero;
+pub(super) mod zero;
 
 use glam::DVec3;
 

@@ -136,8 +136,11 @@ impl Scale {
         }
     }
 
-    /// BRDF over (net rate / reference's net rate), or over the net rate.
+    /// BRDF over (net rate / reference's net rate), or over the net rate; not a number where there is none.
     fn of(&self, wi: DVec3, wo: DVec3) -> f64 {
+        if self.spot.as_ref().is_some_and(|spot| !spot.is_within((wi, wo))) {
+            return f64::NAN;
+        }
         let cosine = self.spot.as_ref().map_or(wo.z, |spot| spot.cosine((wi, wo)));
         self.reference / (cosine * self.mean_cos * self.footprint.map_or(1.0, |f| f.share(wi, wo)))
     }
@@ -296,7 +299,10 @@ impl Left {
         let list = [
             pairs(self.saturated, "even the shortest exposure saturated, or nothing was read"),
             pairs(self.shadowed, "source and detector shadow each other there, or may"),
-            pairs(self.unlit, "below the horizon, or no light of the beam counts there"),
+            pairs(
+                self.unlit,
+                "below the horizon, or no light of the beam counts there, or the spot reaches up to source or detector",
+            ),
         ];
         list.into_iter().flatten().collect()
     }

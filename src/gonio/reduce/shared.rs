@@ -189,12 +189,12 @@ impl<'a> Shared<'a> {
         let instrument = self.instrument;
         let stray = conversion * instrument.gain() * instrument.surroundings.stray_per_sr;
         let (drift, has_reference) = (instrument.source.drift_per_sqrt_hour, self.has_reference);
+        self.bridge(DRIFT, place, &at.base_gap, stray * drift);
         if has_reference {
-            self.bridge(DRIFT, place, &at.reference_gap, (value + stray) * drift);
+            self.bridge(DRIFT, place, &at.reference_gap, value * drift);
         } else {
             // Nothing tells how far the power has walked since the start.
             self.walk(DRIFT, place, of.time_s, value * drift);
-            self.bridge(DRIFT, place, &at.base_gap, stray * drift);
         }
         self.bridge(DARK, place, &at.base_gap, conversion * self.instrument.detector.dark_drift_per_sqrt_hour);
         let detector = &self.instrument.detector;

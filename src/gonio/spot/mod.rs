@@ -18,6 +18,7 @@ use glam::DVec3;
 use self::outline::Piece;
 use super::effects::footprint::Footprint;
 use super::instrument::Instrument;
+use crate::geometry::angles::theta_of;
 use crate::geometry::mirror;
 use crate::measurement::Dimension;
 use crate::numeric::quadrature::gauss_legendre;
@@ -26,7 +27,7 @@ use crate::numeric::quadrature::gauss_legendre;
 pub(super) const FINEST: usize = 128;
 /// Relative error of the mean cosine.
 const EXACT: f64 = 1e-11;
-/// How much of the distance a spot reaches at most: orders for more would not end.
+/// How much of the way to source or detector a spot may reach: beyond there is no beam that is even across, and orders would not end.
 const NEAREST: f64 = 0.9;
 
 /// A pair of directions.
@@ -69,6 +70,15 @@ pub(super) struct Point {
     pub wo: DVec3,
     /// Share of the spot times what source and detector are nearer; without cosθo.
     pub weight: f64,
+}
+
+/// What points of a spot's edge see.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    /// How far (rad) they see the detector from the mirror direction, at most, beside the middle.
+    pub smear: f64,
+    /// Largest polar angles of source and detector, rad.
+    pub theta: [f64; 2],
 }
 
 impl Spot {
@@ -147,33 +157,41 @@ impl Spot {
         sum
     }
 
+    /// How much of the way to source and to detector the spot reaches.
+    fn nearness(&self, (wi, wo): Pair) -> [f64; 2] {
+        let reach = match self.dimension {
+            Dimension::Flat => self.footprint.length(wi, wo),
+            Dimension::Space => self.footprint.edge(wi, wo).iter().map(Piece::reach).fold(0.0, f64::max),
+        };
+        [reach * self.source, reach * self.detector]
+    }
+
+    /// Whether the spot ends well before source and detector; at grazing incidence one that nothing cuts may not.
+    pub fn is_within(&self, pair: Pair) -> bool {
+        pair.0.z <= 0.0 || pair.1.z <= 0.0 || self.nearness(pair).iter().all(|near| *near < NEAREST)
+    }
+
     /// The order that makes the mean of a smooth function as good as `accuracy`: terms fall by the square of how much of the distance the spot reaches.
     pub fn smooth_order(&self, pair: Pair, accuracy: f64) -> usize {
-        let reach = match self.dimension {
-            Dimension::Flat => self.footprint.length(pair.0, pair.1),
-            Dimension::Space => {
-                let edge = self.footprint.edge(pair.0, pair.1);
-                edge.iter().map(Piece::reach).fold(0.0, f64::max)
-            }
-        };
-        let near = reach * self.source.max(self.detector);
-        let order = 0.5 + 0.5 * accuracy.ln() / near.min(NEAREST).ln();
+        let near: f64 = self.nearness(pair).iter().sum();
+        let order = 1.0 + 0.5 * accuracy.ln() / near.min(NEAREST).ln();
         (order.ceil() as usize).clamp(1, FINEST)
     }
 
-    /// How far (rad) points of its edge see the detector from the mirror direction, at most, beside the middle.
-    pub fn smear(&self, pair: Pair) -> f64 {
+    /// What points of its edge see.
+    pub fn view(&self, pair: Pair) -> View {
         let offset = |wi: DVec3, wo: DVec3| wo - mirror(wi);
         let middle = offset(pair.0, pair.1);
-        let mut most = 0.0f64;
+        let mut view = View { smear: 0.0, theta: [theta_of(pair.0), theta_of(pair.1)] };
         let mut at = |p: DVec3| {
             let (wi, wo) = (self.lit(pair.0, p).0, self.seen(pair.1, p).0);
-            most = most.max((offset(wi, wo) - middle).length());
+            view.smear = view.smear.max((offset(wi, wo) - middle).length());
+            view.theta = [view.theta[0].max(theta_of(wi)), view.theta[1].max(theta_of(wo))];
         };
         if self.dimension == Dimension::Flat {
             let half = self.footprint.length(pair.0, pair.1);
             [-half, half].into_iter().for_each(|x| at(DVec3::X * x));
-            return most;
+            return view;
         }
         for piece in self.footprint.edge(pair.0, pair.1) {
             for k in 0..4 {
@@ -181,7 +199,7 @@ impl Spot {
                 [own, own + PI].into_iter().for_each(|own| at(piece.at(own)));
             }
         }
-        most
+        view
     }
 
     /// The order whose points see a peak of this half width (rad) at distances of three half widths at most; `smear` as above.

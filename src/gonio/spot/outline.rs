@@ -40,11 +40,13 @@ impl Piece {
     /// How far from the centre it gets at most.
     pub fn reach(&self) -> f64 {
         let Outline { u, v, .. } = self.outline;
-        let longest = 1.0 / u.min(v).sqrt();
-        if self.is_whole {
-            return longest;
+        // The longer half axis lies at whole or half turns of the own angle, or a quarter beside.
+        let from_axis = if u <= v { 0.0 } else { FRAC_PI_2 };
+        let next = ((self.from - from_axis) / PI).ceil() * PI + from_axis;
+        if self.is_whole || next <= self.to {
+            return 1.0 / u.min(v).sqrt();
         }
-        self.at(self.from).length().max(self.at(self.to).length()).max(self.at(0.5 * (self.from + self.to)).length())
+        self.at(self.from).length().max(self.at(self.to).length())
     }
 
     /// The point of the outline at an own angle.
