@@ -35,9 +35,14 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let out = args.out.clone().unwrap_or_else(|| args.folder.join(NAME));
     stdout_is_free(&out, ui)?;
-    keeps_inputs("--out", &out, args.measurement.iter().map(PathBuf::as_path))?;
+    let inputs = inputs(&args.folder, args.measurement.as_deref());
+    keeps_inputs("--out", &out, inputs.iter().map(PathBuf::as_path))?;
+    is_page(&out)?;
     let options = RunOptions { measurement: args.measurement.clone(), reading: args.reading.options() };
     let run = Run::read(&args.folder, &options)?;
+    // Measurement and fits may lie anywhere.
+    let table = run.table.as_ref().ok().map(|table| table.path.as_path());
+    keeps_inputs("--out", &out, table.into_iter().chain(run.fits.iter().map(|fit| Path::new(&fit.file))))?;
     check_folder(&out)?;
     let written = write(&run, &out)?;
     for missing in &written.missing {
@@ -51,6 +56,30 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let said = format!("{} ({:.1} MB): open it in any browser", out.display(), size as f64 / 1e6);
     ui.result(if out == Path::new("-") { "" } else { &said }, &object);
     Ok(())
+}
+
+/// Files that a page may be made of: the measurement, and all in the folder and its folders that is no page itself.
+fn inputs(folder: &Path, measurement: Option<&Path>) -> Vec<PathBuf> {
+    let within = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+        entries.map(|entry| entry.path()).collect::<Vec<_>>()
+    };
+    let own = within(folder);
+    let deeper: Vec<PathBuf> = own.iter().flat_map(|path| within(path)).collect();
+    let others = own.into_iter().chain(deeper).filter(|path| !has_pages_name(path));
+    measurement.map(Path::to_path_buf).into_iter().chain(others).collect()
+}
+
+fn has_pages_name(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html") || e.eq_ignore_ascii_case("htm"))
+}
+
+/// A page has a page's name, so that a slip does not write one over something else.
+fn is_page(out: &Path) -> Result<(), Failure> {
+    if out == Path::new("-") || has_pages_name(out) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!("--out: expected a name that ends in .html or .htm, or `-`, found {}", out.display())))
 }
 
 /// Writes the page of a folder into it, as `--report` asks.

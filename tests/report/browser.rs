@@ -1,10 +1,12 @@
 //! A headless browser, driven by its DevTools protocol.
 
 use std::collections::VecDeque;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -13,56 +15,144 @@ use tungstenite::{Message, WebSocket};
 
 /// Names under which a browser may be installed.
 const NAMES: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
-/// Longest wait for an answer.
-const PATIENCE: Duration = Duration::from_mins(1);
+/// Longest wait for an answer; computers that build something else meanwhile are slow.
+const PATIENCE: Duration = Duration::from_mins(3);
+/// Longest wait for a browser to say that it is there.
+const START: Duration = Duration::from_mins(1);
 
-/// A page in a browser of its own.
+/// A page in a browser of its own. There is one at a time: several would slow each other down.
 pub struct Page {
-    child: Child,
+    _process: Process,
     socket: WebSocket<TcpStream>,
     session: String,
     sent: u64,
     events: VecDeque<Value>,
     _profile: TempDir,
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// A process that ends with its owner, however that ends.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may be gone already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The first thing that `find` sees in a line, in time; else the last line. The rest is read too, so that the pipe does not fill.
+fn first_in(output: impl Read + Send + 'static, find: fn(&str) -> Option<String>) -> Result<String, String> {
+    let (send, found) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut last = "it says nothing".to_owned();
+        for line in BufReader::new(output).split(b'\n').map_while(Result::ok) {
+            let line = String::from_utf8_lossy(&line).trim().to_owned();
+            if let Some(sought) = find(&line) {
+                // Nobody may wait any more.
+                let _ = send.send(Ok(sought));
+            }
+            if !line.is_empty() {
+                last = line;
+            }
+        }
+        let _ = send.send(Err(last));
+    });
+    found.recv_timeout(START).unwrap_or_else(|_| Err(format!("nothing is heard of it within {} s", START.as_secs())))
+}
+
+/// Whether a program says of itself that it is Chromium or Chrome; a stub that asks for one to be installed does not.
+fn is_browser(program: &Path) -> bool {
+    let mut command = Command::new(program);
+    command.arg("--version").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+    let Ok(child) = command.spawn() else { return false };
+    let mut process = Process(child);
+    let output = process.0.stdout.take().expect("a pipe");
+    let is_named = first_in(output, |line| line.contains("Chrom").then(|| line.to_owned())).is_ok();
+    is_named && ended_well(&mut process)
+}
+
+fn ended_well(process: &mut Process) -> bool {
+    let start = Instant::now();
+    while start.elapsed() < START {
+        match process.0.try_wait() {
+            Ok(Some(status)) => return status.success(),
+            Ok(None) => std::thread::sleep(Duration::from_millis(10)),
+            Err(_) => return false,
+        }
+    }
+    false
 }
 
 /// The browser's path, if one is installed.
-fn installed() -> Option<PathBuf> {
-    let path = std::env::var_os("PATH")?;
-    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    NAMES.iter().flat_map(|name| folders.iter().map(move |f| f.join(name))).find(|p| p.is_file())
+fn installed() -> Option<&'static Path> {
+    static FOUND: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let find = || {
+        let path = std::env::var_os("PATH")?;
+        let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+        let named = NAMES.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
+        named.filter(|p| p.is_file()).find(|p| is_browser(p))
+    };
+    FOUND.get_or_init(find).as_deref()
+}
+
+/// Starts a browser; where it listens, or what it said instead.
+fn start(program: &Path, profile: &Path) -> Result<(Process, String), String> {
+    let mut command = Command::new(program);
+    command.args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]);
+    command.args(["--no-first-run", "--disable-extensions", "--remote-debugging-port=0"]);
+    command.arg(format!("--user-data-dir={}", profile.display())).arg("about:blank");
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut process = Process(command.spawn().map_err(|e| e.to_string())?);
+    let output = process.0.stderr.take().expect("a pipe");
+    let url = first_in(output, |line| line.split_once("DevTools listening on ").map(|(_, url)| url.to_owned()))?;
+    Ok((process, url))
 }
 
 /// A new page, or a line that says why the test is skipped; written past the test harness, which would keep it to itself.
 pub fn page_or_skip(test: &str) -> Option<Page> {
-    let Some(program) = installed() else {
-        let line = format!("report::{test}: skipped, no browser is installed (looked for {})\n", NAMES.join(", "));
-        std::io::stderr().write_all(line.as_bytes()).expect("stderr");
-        return None;
+    static TURN: Mutex<()> = Mutex::new(());
+    /// A browser that was there once must not fail to start later.
+    static STARTED: AtomicBool = AtomicBool::new(false);
+    // A test that failed has ended its browser as well.
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let profile = tempfile::tempdir().expect("a folder");
+    let started = match installed() {
+        Some(program) => {
+            start(program, profile.path()).map_err(|said| format!("{} does not start: {said}", program.display()))
+        }
+        None => Err(format!("no browser is installed (looked for {})", NAMES.join(", "))),
     };
-    Some(Page::open(&program))
+    match started {
+        Ok((process, url)) => {
+            STARTED.store(true, Ordering::Relaxed);
+            Some(Page::open(process, &url, profile, turn))
+        }
+        Err(reason) => {
+            assert!(!STARTED.load(Ordering::Relaxed), "{reason}, though one ran before");
+            let line = format!("report::{test}: skipped, {reason}\n");
+            std::io::stderr().write_all(line.as_bytes()).expect("stderr");
+            None
+        }
+    }
 }
 
 impl Page {
-    fn open(program: &Path) -> Self {
-        let profile = tempfile::tempdir().expect("a folder");
-        let mut command = Command::new(program);
-        command.args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]);
-        command.args(["--no-first-run", "--disable-extensions", "--remote-debugging-port=0"]);
-        command.arg(format!("--user-data-dir={}", profile.path().display())).arg("about:blank");
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-        let mut child = command.spawn().expect("the browser starts");
-        let mut lines = BufReader::new(child.stderr.take().expect("a pipe")).lines();
-        let url = lines.find_map(|line| line.ok()?.split_once("DevTools listening on ").map(|(_, url)| url.to_owned()));
-        let url = url.expect("the browser says where it listens");
-        // The rest of what it says is of no interest, but must not fill the pipe.
-        std::thread::spawn(move || lines.for_each(drop));
+    fn open(process: Process, url: &str, profile: TempDir, turn: MutexGuard<'static, ()>) -> Self {
         let address = url.split('/').nth(2).expect("host and port");
         let stream = TcpStream::connect(address).expect("connects");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time");
-        let (socket, _) = tungstenite::client(&url, stream).expect("a web socket");
-        let mut page =
-            Self { child, socket, session: String::new(), sent: 0, events: VecDeque::new(), _profile: profile };
+        let (socket, _) = tungstenite::client(url, stream).expect("a web socket");
+        let mut page = Self {
+            _process: process,
+            socket,
+            session: String::new(),
+            sent: 0,
+            events: VecDeque::new(),
+            _profile: profile,
+            _turn: turn,
+        };
         let target = page.call("Target.createTarget", json!({ "url": "about:blank" }));
         let attach = json!({ "targetId": target["targetId"], "flatten": true });
         page.session = page.call("Target.attachToTarget", attach)["sessionId"].as_str().expect("a session").into();
@@ -159,10 +249,18 @@ impl Page {
     }
 }
 
-impl Drop for Page {
-    fn drop(&mut self) {
-        // It may be gone already.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+#[cfg(unix)]
+#[test]
+fn programs_that_are_no_browsers_are_told_from_browsers() {
+    let path = std::env::var_os("PATH").expect("a path");
+    let program =
+        |name: &str| std::env::split_paths(&path).map(|f| f.join(name)).find(|p| p.is_file()).expect("is there");
+    assert!(!is_browser(&program("false")), "it fails");
+    assert!(!is_browser(&program("true")), "it has another name");
+    assert!(!is_browser(Path::new("/dev/null/chrome")), "it is not there");
+    let profile = tempfile::tempdir().expect("a folder");
+    let said = start(&program("true"), profile.path()).err().expect("it does not listen");
+    assert_eq!(said, "it says nothing");
+    let said = start(&program("ls"), profile.path()).err().expect("it does not listen");
+    assert!(said.len() > 10 && said != "it says nothing", "what it complains of: {said}");
 }

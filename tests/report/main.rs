@@ -5,6 +5,7 @@
 
 mod accessible;
 mod browser;
+mod command;
 mod controls;
 mod layout;
 mod loading;

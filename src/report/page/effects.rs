@@ -5,8 +5,8 @@ use serde_json::Value;
 use super::reproduce::typed;
 use crate::chain::{Stage, scene_plan};
 use crate::control::Plan;
-use crate::gonio;
-use crate::report::run::{Kind, Run, RunFit};
+use crate::gonio::{self, Instrument};
+use crate::report::run::{DEMO_INSTRUMENT, Kind, Run, RunFit, known_instrument};
 use crate::report::views::Predicted;
 use crate::report::words::percent;
 
@@ -32,10 +32,17 @@ pub(super) struct Listed {
 
 pub(super) struct Effects {
     pub lists: Vec<Listed>,
+    /// Why there is no list of the instrument's, where there should be one.
+    pub missing: Option<String>,
 }
 
 pub(super) fn effects(run: &Run) -> Effects {
-    Effects { lists: instrument(run).into_iter().chain(scene(run)).collect() }
+    let (instrument, missing) = match instrument(run) {
+        None => (None, None),
+        Some(Ok(list)) => (Some(list), None),
+        Some(Err(reason)) => (None, Some(reason)),
+    };
+    Effects { lists: instrument.into_iter().chain(scene(run)).collect(), missing }
 }
 
 fn plain(plan: Plan) -> Vec<Effect> {
@@ -49,20 +56,29 @@ fn plain(plan: Plan) -> Vec<Effect> {
     plan.effects.into_iter().map(one).collect()
 }
 
-/// Of a simulated measurement.
-fn instrument(run: &Run) -> Option<Listed> {
+/// Of a simulated measurement; the reason where its instrument is not at hand.
+fn instrument(run: &Run) -> Option<Result<Listed, String>> {
     if run.kind != Kind::Demo {
         return None;
     }
     let name = run.instrument.as_deref()?;
     let truth = run.truth.as_ref()?.material();
-    let known = crate::report::run::instrument(name, run.made.folder.as_deref());
     let mut words = vec!["goniofit", "effects", "--material", &run.title];
-    if known.is_some() {
+    let own = name == DEMO_INSTRUMENT;
+    if !own {
         words.extend(["--instrument", name]);
     }
-    let effects = plain(gonio::plan(&known.unwrap_or_default(), &truth.channels));
-    Some(Listed::new(format!("The instrument, {name}"), effects, false, typed(&words)))
+    let command = typed(&words);
+    let known = if own { Some(Instrument::default()) } else { known_instrument(name, run.made.folder.as_deref()) };
+    Some(match known {
+        Some(known) => {
+            let effects = plain(gonio::plan(&known, &truth.channels));
+            Ok(Listed::new(format!("The instrument, {name}"), effects, false, command))
+        }
+        None => Err(format!(
+            "What the instrument {name} simulates is not known here: it is neither built in, nor can its file be read where the run was made. Where it is: {command}"
+        )),
+    })
 }
 
 /// Of the scene, with what `effects.json` says of it.
@@ -97,5 +113,40 @@ fn told(effect: &Value) -> Effect {
         why: effect["why"].as_str().unwrap_or_default().into(),
         share: share("share"),
         off_by: share("off_by"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{LobeKind, Material};
+
+    fn measured_by(name: &str) -> Run {
+        let truth = Material::new(vec!["x".into()], vec![(LobeKind::Lambert, vec![0.5], vec![])]);
+        Run {
+            kind: Kind::Demo,
+            title: "glossy-paint".into(),
+            instrument: Some(name.into()),
+            truth: Some(Predicted::new(&truth, None)),
+            ..Run::empty()
+        }
+    }
+
+    #[test]
+    fn effects_are_those_of_the_runs_instrument_or_none() {
+        let found = effects(&measured_by(DEMO_INSTRUMENT));
+        assert_eq!((found.lists.len(), found.missing), (1, None));
+        assert!(!found.lists[0].command.contains("--instrument"), "{}", found.lists[0].command);
+
+        let found = effects(&measured_by("commercial"));
+        assert!(found.missing.is_none() && found.lists[0].command.ends_with("--instrument commercial"));
+        assert!(found.lists[0].on.len() > 2, "an instrument with parts");
+
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut run = measured_by("mine.toml");
+        run.made.folder = Some(folder.path().into());
+        let found = effects(&run);
+        assert!(found.lists.is_empty(), "another instrument's effects under its name");
+        assert!(found.missing.is_some_and(|said| said.contains("mine.toml")));
     }
 }

@@ -56,12 +56,14 @@ struct Missing {
     residuals: String,
     pictures: String,
     tradeoff: String,
+    effects: String,
 }
 
 impl Missing {
     fn list(&self) -> Vec<String> {
-        let all = [&self.measured, &self.fits, &self.lobes, &self.residuals, &self.pictures, &self.tradeoff];
-        all.into_iter().filter(|m| !m.is_empty()).cloned().collect()
+        let first = [&self.measured, &self.fits, &self.lobes, &self.residuals];
+        let all = first.into_iter().chain([&self.pictures, &self.tradeoff, &self.effects]);
+        all.filter(|m| !m.is_empty()).cloned().collect()
     }
 }
 
@@ -73,7 +75,9 @@ pub fn page(run: &Run) -> Result<Written, ReportError> {
     let lobes = lobes::lobes(run);
     let residuals = residuals::residuals(run);
     let pictures = pictures::pictures(run)?;
-    let missing = missing(run, lobes.is_some(), pictures.is_some());
+    let mut missing = missing(run, lobes.is_some(), pictures.is_some());
+    let mut effects = effects::effects(run);
+    missing.effects = effects.missing.take().unwrap_or_default();
     let data = data::json(lobes.as_ref(), &residuals, pictures.as_ref());
     let summary = summary::summary(run);
     let warnings = summary.warnings.len();
@@ -82,7 +86,7 @@ pub fn page(run: &Run) -> Result<Written, ReportError> {
         measured: measured::measured(run),
         fits: fits::fits(run),
         time: time::time(run),
-        effects: effects::effects(run),
+        effects,
         reproduce: reproduce::reproduce(run),
         css: css(),
         summary,

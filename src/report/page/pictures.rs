@@ -48,7 +48,7 @@ pub(super) fn pictures(run: &Run) -> Result<Option<Pictures>, ReportError> {
     let same_size =
         |p: &&crate::report::run::Picture| (p.image.width, p.image.height) == (first.image.width, first.image.height);
     let all: Vec<_> = run.pictures.iter().filter(same_size).collect();
-    let factor = factor(first.image.width * first.image.height * all.len());
+    let factor = factor(first.image.width, first.image.height, all.len());
     let images: Vec<Image> =
         all.iter().map(|p| if factor == 1 { p.image.clone() } else { reduced(&p.image, factor) }).collect();
     let exposure = run.exposure.unwrap_or_else(|| exposure_for(&first.image));
@@ -98,14 +98,17 @@ const COVER: usize = 220;
 /// The first picture, small, with its alternative text.
 pub(super) fn cover(run: &Run) -> Option<(String, String)> {
     let first = run.pictures.first()?;
-    let image = reduced(&first.image, (first.image.width / COVER).max(1));
+    let Image { width, height, .. } = first.image;
+    let image = reduced(&first.image, (width / COVER).min(height).max(1));
     let exposure = run.exposure.unwrap_or_else(|| exposure_for(&first.image));
     Some((png(&develop(&image, exposure)).ok()?, format!("{}, rendered", first.label)))
 }
 
-/// By how much pictures are made smaller so that all fit.
-fn factor(pixels: usize) -> usize {
-    (pixels as f64 / MOST_PIXELS as f64).sqrt().ceil().max(1.0) as usize
+/// By how much so many pictures are made smaller so that all fit; a strip keeps a pixel of its narrow side.
+fn factor(width: usize, height: usize, pictures: usize) -> usize {
+    let pixels = (width * height * pictures) as f64;
+    let wanted = (pixels / MOST_PIXELS as f64).sqrt().ceil() as usize;
+    wanted.min(width).min(height).max(1)
 }
 
 fn difference_shot(
@@ -152,4 +155,32 @@ fn lines(fits: &[&RunFit]) -> Vec<Line> {
         fits.iter().map(cell).collect::<Vec<_>>()
     };
     list.into_iter().map(|(name, say)| Line { name, cells: of(say) }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_become_as_small_as_they_must_and_strips_stay_pictures() {
+        assert_eq!(factor(360, 360, 4), 1);
+        assert_eq!(factor(1000, 1000, 3), 3);
+        for (width, height) in [(1000, 3), (1, 4_000_000), (2_000_000, 1), (900_000, 4)] {
+            let by = factor(width, height, 3);
+            assert!(width / by >= 1 && height / by >= 1, "{width}×{height} by {by}");
+        }
+    }
+
+    #[test]
+    fn a_strip_has_a_cover_and_a_place_among_the_pictures() {
+        let strip = |label: &str, level: f64| crate::report::run::Picture {
+            label: label.into(),
+            file: format!("{label}.exr"),
+            image: Image { width: 600_000, height: 1, radiance: vec![[level; 3]; 600_000], ..Image::default() },
+        };
+        let run = Run { pictures: vec![strip("truth", 0.5), strip("fit", 0.4)], ..Run::empty() };
+        assert!(cover(&run).is_some_and(|(png, _)| png.len() > 100));
+        let shown = pictures(&run).expect("encodes").expect("two");
+        assert_eq!((shown.width, shown.height, shown.shots.len()), (600_000, 1, 2));
+    }
 }

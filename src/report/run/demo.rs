@@ -12,6 +12,9 @@ use crate::gonio::sight::Cones;
 use crate::gonio::{Instrument, Preset, SimulationSpec};
 use crate::report::views::Predicted;
 
+/// What `numbers.json` calls the instrument of a demo that none was named for.
+pub(in crate::report) const DEMO_INSTRUMENT: &str = "shot and read noise";
+
 pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Result<Run, ReportError> {
     let path = options.measurement.clone().unwrap_or_else(|| folder.join("measurement.csv"));
     let instrument = numbers["instrument"].as_str().map(str::to_owned);
@@ -29,6 +32,16 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Resu
         let image = (!entry["image"].is_null()).then(|| entry["image"].clone());
         fits.push(RunFit { label, file, predicted: Predicted::new(&material, sight), image });
     }
+    let mut notes: Vec<String> = stopped(numbers).into_iter().collect();
+    if let (Some(name), None) = (&instrument, &own)
+        && name != DEMO_INSTRUMENT
+        && fits.iter().any(|f| f.material().fit.as_ref().is_some_and(|record| record.through.is_some()))
+    {
+        notes.push(format!(
+            "The instrument {name} is neither built in, nor can its file be read where the run was made; here the fit made through it takes readings \
+             at face value."
+        ));
+    }
     let times = numbers["seconds"].as_array().into_iter().flatten();
     let first = |p: &super::Picture| p.image.metadata.clone();
     let metadata = pictures.first().map(first).unwrap_or_default();
@@ -45,7 +58,7 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Resu
         scene: metadata.scene,
         seed: metadata.seed,
         made,
-        notes: stopped(numbers).into_iter().collect(),
+        notes,
         ..Run::empty()
     })
 }

@@ -2,17 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Kind, ReportError, Run, RunFit, RunOptions, Table};
+use super::{EFFECTS, Kind, ReportError, Run, RunFit, RunOptions, SWEEP, Table, json, left_out};
 use crate::brdf::Material;
 use crate::report::views::Predicted;
 
 /// Names that a measurement beside its fits may have.
 const MEASUREMENTS: [&str; 2] = ["csv", "binary"];
+/// JSON that is no fit by its name.
+const OTHERS: [&str; 2] = [EFFECTS, SWEEP];
 
 pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportError> {
-    let fits = fits(folder)?;
+    let (fits, mut refused) = fits(folder)?;
     if fits.is_empty() {
-        return Err(ReportError::Nothing { path: folder.into() });
+        let nothing = ReportError::Nothing { path: folder.into() };
+        return Err(if refused.is_empty() { nothing } else { refused.swap_remove(0) });
     }
     let path = options.measurement.clone().or_else(|| only_measurement(folder));
     let unknown = "which measurement the fits are of is not known: name it by --measurement FILE";
@@ -25,22 +28,30 @@ pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportErr
         title: title.unwrap_or_else(|| "fits".into()),
         table,
         fits,
+        notes: refused.iter().map(|error| left_out(&error.to_string())).collect(),
         ..Run::empty()
     })
 }
 
-/// Every material in the folder, by name.
-fn fits(folder: &Path) -> Result<Vec<RunFit>, ReportError> {
-    let mut found = Vec::new();
-    for path in files(folder)?.into_iter().filter(|p| p.extension().is_some_and(|e| e == "json")) {
-        let text = std::fs::read_to_string(&path).map_err(|source| ReportError::Io { path: path.clone(), source })?;
+/// Every material in the folder, by name, and what can't be read.
+fn fits(folder: &Path) -> Result<(Vec<RunFit>, Vec<ReportError>), ReportError> {
+    let is_fit = |p: &PathBuf| p.extension().is_some_and(|e| e == "json") && !OTHERS.iter().any(|o| p.ends_with(o));
+    let (mut found, mut refused) = (Vec::new(), Vec::new());
+    for path in files(folder)?.into_iter().filter(is_fit) {
+        let value = match json(&path) {
+            Ok(value) => value,
+            Err(error) => {
+                refused.push(error);
+                continue;
+            }
+        };
         // Other JSON may lie there too.
-        let Ok(material) = Material::from_json(&text) else { continue };
+        let Ok(material) = Material::from_json(&value.to_string()) else { continue };
         let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         let file = path.display().to_string();
         found.push(RunFit { label: stem, file, predicted: Predicted::new(&material, None), image: None });
     }
-    Ok(found)
+    Ok((found, refused))
 }
 
 /// The folder's files by name.
@@ -50,6 +61,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
     for entry in std::fs::read_dir(folder).map_err(refused)? {
         files.push(entry.map_err(refused)?.path());
     }
+    files.retain(|path| path.is_file());
     files.sort();
     Ok(files)
 }

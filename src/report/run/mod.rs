@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-pub(in crate::report) use demo::find as instrument;
+pub(in crate::report) use demo::{DEMO_INSTRUMENT, find as known_instrument};
 pub use error::ReportError;
 pub use table::Table;
 
@@ -123,7 +123,7 @@ impl Run {
     /// Reads a folder.
     ///
     /// # Errors
-    /// [`ReportError`] where there is nothing to report, or a file that belongs to it can't be read.
+    /// [`ReportError`] where there is nothing to report, or a file that it can't do without can't be read; others become notes.
     pub fn read(folder: &Path, options: &RunOptions) -> Result<Self, ReportError> {
         let path = folder.join("numbers.json");
         if !folder.is_dir() {
@@ -141,12 +141,31 @@ impl Run {
         } else {
             loose::read(folder, options)?
         };
-        let effects = folder.join("effects.json");
-        if effects.is_file() {
-            run.effects = Some(json(&effects)?);
-        }
-        run.sweeps = sweeps(folder)?.iter().map(|path| json(path)).collect::<Result<_, _>>()?;
+        run.add_extras();
         Ok(run)
+    }
+
+    /// Adds what other commands left in the folder; what can't be read becomes a note.
+    fn add_extras(&mut self) {
+        let effects = self.folder.join(EFFECTS);
+        if effects.is_file() {
+            self.effects = self.extra(&effects, "effects");
+        }
+        for path in sweeps(&self.folder) {
+            let sweep = self.extra(&path, "curves");
+            self.sweeps.extend(sweep);
+        }
+    }
+
+    /// An object with a list of this name.
+    fn extra(&mut self, path: &Path, list: &str) -> Option<Value> {
+        let reason = match json(path) {
+            Ok(value) if value[list].is_array() => return Some(value),
+            Ok(_) => format!("{}: expected an object with the list `{list}`, found none", path.display()),
+            Err(error) => error.to_string(),
+        };
+        self.notes.push(left_out(&reason));
+        None
     }
 
     /// A measurement and one fit of it, as `fit` has them at hand.
@@ -172,7 +191,7 @@ impl Run {
         }
     }
 
-    fn empty() -> Self {
+    pub(in crate::report) fn empty() -> Self {
         Self {
             kind: Kind::Fit,
             folder: PathBuf::new(),
@@ -192,6 +211,15 @@ impl Run {
             sweeps: Vec::new(),
         }
     }
+}
+
+/// What `goniofit effects` and `tradeoff` wrote.
+const EFFECTS: &str = "effects.json";
+const SWEEP: &str = "tradeoff.json";
+
+/// The note on a file of the folder that is no part of the report.
+fn left_out(reason: &str) -> String {
+    format!("A file is left out: {reason}.")
 }
 
 /// What lobes are seen through.
@@ -236,13 +264,13 @@ fn picture(folder: &Path, file: &str, label: &str) -> Result<Option<Picture>, Re
 }
 
 /// Where sweeps lie, by name.
-fn sweeps(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    const NAME: &str = "tradeoff.json";
-    let entries = std::fs::read_dir(folder).map_err(|source| ReportError::Io { path: folder.into(), source })?;
-    let within = entries.filter_map(Result::ok).map(|e| e.path().join(NAME));
-    let mut found: Vec<PathBuf> = within.chain([folder.join(NAME)]).filter(|p| p.is_file()).collect();
+fn sweeps(folder: &Path) -> Vec<PathBuf> {
+    // A folder that does not tell what is in it may hold the run all the same.
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let within = entries.filter_map(Result::ok).map(|e| e.path().join(SWEEP));
+    let mut found: Vec<PathBuf> = within.chain([folder.join(SWEEP)]).filter(|p| p.is_file()).collect();
     found.sort();
-    Ok(found)
+    found
 }
 
 /// The note on a run that was ended early.
