@@ -1,5 +1,5 @@
-//! What advice promises at 95 % is met in at least 89 of 100 trials: several sweeps, each with trials of its own of what it advised. All seeds are
-//! fixed and errors do not depend on the clock, so that the outcome is the same on every machine.
+//! What advice promises of errors at 95 % is met in at least 89 of 100 trials: several sweeps, each with trials of its own of what it advised. Seeds are
+//! fixed, trials count whatever time they take, and a setting's price is its size: a slow or busy machine comes to the same outcome.
 #![allow(clippy::expect_used)] // helpers of tests
 
 mod promises;

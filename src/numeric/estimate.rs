@@ -40,7 +40,7 @@ impl Estimate {
 }
 
 /// Median of times or other positive values. From six values on the interval is that of order statistics, which holds whatever the
-/// distribution; below, Student's of the logarithms. `None` where there is no value.
+/// distribution; below, Student's of the logarithms, where all have one. `None` where there is no value.
 #[must_use]
 pub fn median(values: &[f64]) -> Option<Estimate> {
     let mut sorted = values.to_vec();
@@ -55,7 +55,7 @@ pub fn median(values: &[f64]) -> Option<Estimate> {
         return Some(Estimate { value, low: sorted[rank], high: sorted[n - 1 - rank] });
     }
     let logs: Vec<f64> = sorted.iter().map(|v| v.ln()).collect();
-    let Some((_, deviation)) = moments(&logs) else { return Some(Estimate::alone(value)) };
+    let Some((_, deviation)) = moments(&logs).filter(|m| m.1.is_finite()) else { return Some(Estimate::alone(value)) };
     let reach = (student_quantile(0.975, n as f64 - 1.0) * deviation / (n as f64).sqrt()).exp();
     Some(Estimate { value, low: value / reach, high: value * reach })
 }
@@ -63,31 +63,32 @@ pub fn median(values: &[f64]) -> Option<Estimate> {
 /// The largest k for which the median lies between the values of rank k and n − 1 − k (from 0) with 95 % confidence: the number of
 /// values below it is binomial. `None` below six values.
 fn order(n: usize) -> Option<usize> {
-    let (mut term, mut sum, mut rank) = (0.5f64.powi(n as i32), 0.0, None);
+    // Logarithms, for 2⁻ⁿ is 0 from n = 1075 on; terms that are 0 in themselves are too small to count.
+    let (mut log_term, mut sum, mut rank) = (-(n as f64) * std::f64::consts::LN_2, 0.0, None);
     for k in 0..n {
-        sum += term;
+        sum += log_term.exp();
         if sum > 0.025 {
             break;
         }
         rank = Some(k);
-        term *= (n - k) as f64 / (k + 1) as f64;
+        log_term += ((n - k) as f64 / (k + 1) as f64).ln();
     }
     rank
 }
 
 /// Root of the mean square of errors. The interval is Student's of the mean square, by way of its logarithm, so that it stays positive.
-/// `None` where there is no value, or one is not a number.
+/// `None` where there is no value, or their mean square is not finite.
 #[must_use]
 pub fn root_mean_square(errors: &[f64]) -> Option<Estimate> {
     let n = errors.len() as f64;
     let squares: Vec<f64> = errors.iter().map(|e| e * e).collect();
     let mean = squares.iter().sum::<f64>() / n;
-    if mean.is_nan() {
+    if !mean.is_finite() {
         return None;
     }
     let value = mean.sqrt();
     let Some((_, deviation)) = moments(&squares) else { return Some(Estimate::alone(value)) };
-    if deviation == 0.0 {
+    if deviation == 0.0 || value == 0.0 {
         return Some(Estimate::exact(value));
     }
     let reach = (0.5 * student_quantile(0.975, n - 1.0) * deviation / (mean * n.sqrt())).exp();
@@ -160,10 +161,23 @@ mod tests {
     fn medians_and_their_ends_are_the_published_ones() {
         // Conover, Practical Nonparametric Statistics, table A3: n = 6 takes the extremes, n = 10 the second ones, n = 20 the sixth.
         assert_eq!([5, 6, 8, 9, 10, 20].map(order), [None, Some(0), Some(0), Some(1), Some(1), Some(5)]);
+        // The binomial's sums in whole numbers: 2⁻ⁿ is 0 from n = 1075 on.
+        assert_eq!([1074, 1075, 2000, 10_000].map(order), [504, 504, 955, 4901].map(Some));
+        let many: Vec<f64> = (1..=2000).map(f64::from).collect();
+        assert_eq!(median(&many), Some(Estimate { value: 1000.5, low: 956.0, high: 1045.0 }));
         let found = median(&[3.0, 1.0, 2.0, 6.0, 5.0, 4.0]).expect("values");
         assert_eq!(found, Estimate { value: 3.5, low: 1.0, high: 6.0 });
         assert_eq!(median(&[]), None);
         assert_eq!(median(&[2.0]), Some(Estimate::alone(2.0)));
+    }
+
+    #[test]
+    fn ends_are_numbers_or_there_is_no_estimate() {
+        assert_eq!(root_mean_square(&[0.0; 3]), Some(Estimate::exact(0.0)));
+        for errors in [&[1.0, f64::INFINITY][..], &[1.0, f64::NAN], &[1e200, 1e200], &[]] {
+            assert_eq!(root_mean_square(errors), None, "{errors:?}");
+        }
+        assert_eq!(median(&[0.0, 2.0, 3.0]), Some(Estimate::alone(2.0)));
     }
 
     /// The binomial's standard deviation over 2000 draws is 0.5 %.

@@ -98,7 +98,11 @@ impl<'a> Adviser<'a> {
     /// Of the measure with this index.
     #[must_use]
     pub fn new(sweep: &Sweep, curve: &'a Curve, measure: usize) -> Self {
-        let errors = |p: &Point| p.trials.iter().map(|t| t.errors[measure]).filter(|e| !e.is_nan()).collect();
+        // Errors that could be told beside others that could not are not chosen by chance: such a setting takes no part.
+        let errors = |p: &Point| {
+            let all: Vec<f64> = p.trials.iter().map(|t| t.errors[measure]).collect();
+            if all.iter().any(|e| e.is_nan()) { Vec::new() } else { all }
+        };
         let seconds = |p: &Point| p.trials.iter().map(|t| t.seconds).collect();
         let [of_errors, of_seconds] = [scatter(curve, &errors), scatter(curve, &seconds)];
         let known = |point: &'a Point| {
@@ -362,7 +366,8 @@ mod tests {
         let control = crate::control::Control::silent();
         let runs = run::<_, ()>(&settings, &effort, control, |i, turn| Ok(made_up(sizes[i], turn.seed))).expect("runs");
         let measures = vec![Measure { name: "error", what: "made up" }];
-        let curves = super::super::curve::curves(&[series], &settings, &measures, &runs, &|_, _| None);
+        let curves =
+            super::super::curve::curves(&[series], &settings, &measures, &runs, &super::super::curve::Beside::NOTHING);
         let about = super::super::curve::About {
             stage: "render",
             subject: String::new(),
@@ -408,6 +413,17 @@ mod tests {
             let advice = advise(&sweep, &Wish::Error(None, most)).expect("within reach");
             assert!(advice.error.at_most <= most * (1.0 + 1e-9), "{advice:?}");
         }
+    }
+
+    #[test]
+    fn a_setting_with_an_error_that_could_not_be_told_takes_no_part() {
+        let mut sweep = sweep_of(4);
+        if let Some(last) = sweep.curves[0].points.last_mut() {
+            last.trials[2].errors[0] = f64::NAN;
+        }
+        let adviser = Adviser::new(&sweep, &sweep.curves[0], 0);
+        let sizes: Vec<f64> = adviser.known.iter().filter_map(|k| k.point.size).collect();
+        assert_eq!(sizes, [4.0, 16.0, 64.0, 256.0]);
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub fn to_csv(sweep: &Sweep) -> String {
         let name = measure.name.replace('-', "_");
         header.extend([name.clone(), format!("{name}_low"), format!("{name}_high")]);
     }
-    header.extend(["promise", "kept", "standing"].map(str::to_owned));
+    header.extend(["promise", "kept", "judged", "standing"].map(str::to_owned));
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut rows = vec![header];
     for (curve, point) in sweep.points() {
@@ -52,6 +52,7 @@ fn row(curve: &str, axis: &str, point: &Point) -> Vec<String> {
         Standing::Beaten => "beaten",
         Standing::Unknown => "unknown",
     };
-    row.extend([number(point.promise), point.kept.map_or(String::new(), |k| k.to_string()), standing.into()]);
+    let count = |n: Option<usize>| n.map_or(String::new(), |n| n.to_string());
+    row.extend([number(point.promise), count(point.kept), count(point.judged), standing.into()]);
     row
 }

@@ -74,7 +74,7 @@ pub struct Point {
     /// Time of the simulated instrument, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instrument_s: Option<f64>,
-    /// Root mean squares over the trials, measure by measure.
+    /// Root mean squares over the trials, measure by measure; none where a trial's could not be told, for those that could are not chosen by chance.
     pub errors: Vec<Option<Estimate>>,
     /// What the setting promises of the main measure.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,6 +82,9 @@ pub struct Point {
     /// In how many trials that was kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<usize>,
+    /// Of how many: those in which it can be told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub judged: Option<usize>,
     /// Where it stands among the settings that spend the same time for the same measure.
     pub standing: Standing,
     /// The trials themselves.
@@ -139,16 +142,29 @@ impl Sweep {
     }
 }
 
+/// What a stage knows beside its trials.
+pub(super) struct Beside<'a> {
+    /// Errors that are not the root mean square of those of trials, by the index of setting and measure.
+    pub errors: &'a dyn Fn(usize, usize) -> Option<Estimate>,
+    /// What a trial's main error stays below where it could not be told.
+    pub untold: f64,
+}
+
+impl Beside<'_> {
+    /// Nothing.
+    pub const NOTHING: Self = Self { errors: &|_, _| None, untold: f64::INFINITY };
+}
+
 /// The curves of the series. Settings without a whole trial are left out, and series without any setting.
 pub(super) fn curves<S>(
     series: &[Series],
     settings: &[Setting<S>],
     measures: &[Measure],
     runs: &Runs,
-    more: &dyn Fn(usize, usize) -> Option<Estimate>,
+    beside: &Beside<'_>,
 ) -> Vec<Curve> {
     let mut points: Vec<Option<Point>> = (0..settings.len())
-        .map(|i| point(&settings[i], &series[settings[i].series], &runs.trials[i], measures.len(), &|m| more(i, m)))
+        .map(|i| point(&settings[i], &series[settings[i].series], &runs.trials[i], i, measures.len(), beside))
         .collect();
     stand(series, settings, &mut points);
     let of_series = |(s, series): (usize, &Series)| {
@@ -173,27 +189,37 @@ fn point<S>(
     setting: &Setting<S>,
     series: &Series,
     trials: &[Trial],
+    index: usize,
     measures: usize,
-    more: &dyn Fn(usize) -> Option<Estimate>,
+    beside: &Beside<'_>,
 ) -> Option<Point> {
     let seconds = median(&trials.iter().map(|t| t.seconds).collect::<Vec<_>>())?;
-    let of_trials = |m: usize| {
-        let told: Vec<f64> = trials.iter().map(|t| t.errors[m]).filter(|e| !e.is_nan()).collect();
-        root_mean_square(&told).filter(|_| 2 * told.len() > trials.len())
-    };
-    let kept = |promise: f64| trials.iter().filter(|t| t.errors[series.main] <= promise).count();
+    let of_trials = |m: usize| root_mean_square(&trials.iter().map(|t| t.errors[m]).collect::<Vec<_>>());
+    let kept = setting.promise.map(|promise| kept(trials, series.main, promise, beside.untold));
     Some(Point {
         setting: setting.text.clone(),
         size: setting.size,
         effective: setting.effective.or(setting.size),
         seconds,
         instrument_s: setting.instrument_s,
-        errors: (0..measures).map(|m| more(m).or_else(|| of_trials(m))).collect(),
+        errors: (0..measures).map(|m| (beside.errors)(index, m).or_else(|| of_trials(m))).collect(),
         promise: setting.promise,
-        kept: setting.promise.map(kept),
+        kept: kept.map(|k| k.0),
+        judged: kept.map(|k| k.1),
         standing: Standing::Unknown,
         trials: trials.to_vec(),
     })
+}
+
+/// In how many trials an error is at most what was promised, and in how many that can be judged. An error that could not be told stays below `untold`, which
+/// keeps a promise of more; of a promise of less it says nothing.
+fn kept(trials: &[Trial], main: usize, promise: f64, untold: f64) -> (usize, usize) {
+    let met = |t: &Trial| match t.errors[main] {
+        e if e.is_nan() => (untold <= promise).then_some(true),
+        e => Some(e <= promise),
+    };
+    let told: Vec<bool> = trials.iter().filter_map(met).collect();
+    (told.iter().filter(|met| **met).count(), told.len())
 }
 
 /// Settings compete that spend the same time for the same measure.
@@ -263,5 +289,18 @@ impl About {
             seconds: began.elapsed().as_secs_f64(),
             ended,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_promise_counts_in_trials_that_can_be_judged() {
+        let trials = [0.5, 2.0, f64::NAN, 1.0].map(|e| Trial { seconds: 1.0, errors: vec![0.0, e] });
+        assert_eq!(kept(&trials, 1, 1.0, f64::INFINITY), (2, 3));
+        assert_eq!(kept(&trials, 1, 1.0, 0.9), (3, 4), "it stays below the promise");
+        assert_eq!(kept(&trials, 1, 1.0, 1.1), (2, 3), "it may be above");
     }
 }

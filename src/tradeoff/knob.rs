@@ -64,6 +64,7 @@ impl Knob {
             Self::Stride | Self::Part => {
                 whole / if up { (whole / size + 1e-9).floor() } else { (whole / size - 1e-9).ceil() }.max(1.0)
             }
+            Self::Dwell => significant(size, round),
             _ => size,
         }
     }
@@ -78,10 +79,17 @@ impl Knob {
             Self::Part => format!("--part {:.0}", whole / size),
             Self::ExcessTarget => format!("--target-rmse-excess {}", short(size)),
             Self::Readings => format!("--readings {size:.0}"),
-            Self::Dwell => format!("exposures × {}", (1e3 * size).round() / 1e3),
+            Self::Dwell => format!("exposures × {}", short(size)),
             Self::Effects | Self::Step | Self::Shares => String::new(),
         }
     }
+}
+
+/// A positive number of three digits, by `round` of the first three as a whole number.
+fn significant(x: f64, round: impl Fn(f64) -> f64) -> f64 {
+    let last = x.log10().floor() - 2.0;
+    // Read as it will be typed, so that both are the same number.
+    format!("{}e{last}", round(x / 10f64.powf(last))).parse().unwrap_or(x)
 }
 
 /// A number as one types it.
@@ -98,6 +106,16 @@ mod tests {
         assert_eq!(Knob::Samples.rounded(12.3, true, 0.0), 13.0);
         assert_eq!(Knob::Samples.rounded(12.3, false, 0.0), 12.0);
         assert_eq!(Knob::Samples.rounded(12.0, true, 0.0), 12.0);
+        // An exposure is the number that is typed.
+        for (size, down, up) in
+            [(0.001_234, 0.001_23, 0.001_24), (2.0, 2.0, 2.0), (9.999, 9.99, 10.0), (123.4, 123.0, 124.0)]
+        {
+            assert_eq!([false, true].map(|is_up| Knob::Dwell.rounded(size, is_up, 0.0)), [down, up]);
+            for x in [down, up] {
+                let typed = Knob::Dwell.typed(x, 0.0);
+                assert_eq!(typed.rsplit(' ').next().and_then(|t| t.parse().ok()), Some(x), "{typed}");
+            }
+        }
         // 1000 directions, 130 wanted: every seventh gives 142.9, every eighth 125.
         assert_eq!(Knob::Stride.typed(Knob::Stride.rounded(130.0, true, 1000.0), 1000.0), "--stride 7");
         assert_eq!(Knob::Stride.typed(Knob::Stride.rounded(130.0, false, 1000.0), 1000.0), "--stride 8");

@@ -3,7 +3,7 @@
 //! In: what is to be done (a table, a scene, a simulation) and the settings to try. Out: a [`Sweep`] of curves with 95 % intervals, their slopes
 //! beside those of theory, the Pareto front, and [`advise`], which turns a curve into the setting for a wanted error or time. Times are in
 //! seconds, errors are relative. The one decision to know: an error is always one against a reference that was made better than anything that
-//! is measured with it, and how good the reference itself is stands in the result; a trial that comes near to that is left out.
+//! is measured with it, and how good the reference itself is stands in the result; a setting with a trial that comes near to that has no error.
 
 mod advise;
 

@@ -33,6 +33,8 @@ pub(super) struct Turn {
     pub round: u32,
     /// A seed that no other trial has.
     pub seed: u64,
+    /// Whether it was made before, and is made again for its time alone: all else comes out as it did.
+    pub again: bool,
 }
 
 /// What came of the trials of every setting, and why there are not all of them, where that is so.
@@ -42,8 +44,8 @@ pub(super) struct Runs {
     pub ended: Option<String>,
 }
 
-/// A series' first setting is tried once more, without counting, where it takes less than this: what is made once (tables, threads, pages of memory)
-/// would be a large part of that.
+/// A series' first trial is made again, with the same seed, where it takes less than this, and the second time counts: what is made once (tables,
+/// threads, pages of memory) would be a large part of the first. Errors are the same either way, whatever the clock says.
 const WARM: Duration = Duration::from_millis(500);
 
 /// Tries every setting in every round. `trial` gets the setting's index.
@@ -73,14 +75,14 @@ pub(super) fn run<S, E>(
                 control.progress.advance(1);
                 continue;
             }
-            let seed = |again: u64| mix(effort.seed ^ mix(u64::from(round) << 32 | (index as u64) << 1 | again));
-            let turn = |again: u64| Turn { round, seed: seed(again) };
             let is_first = round == 0 && (index == 0 || settings[index].series != settings[index - 1].series);
+            let seed = mix(effort.seed ^ mix(u64::from(round) << 32 | (index as u64) << 1 | u64::from(is_first)));
+            let turn = |again: bool| Turn { round, seed, again };
             let mut began = Instant::now();
-            let mut found = trial(index, turn(0))?;
+            let mut found = trial(index, turn(false))?;
             if is_first && began.elapsed() < WARM {
                 began = Instant::now();
-                found = trial(index, turn(1))?;
+                found = trial(index, turn(true))?;
             }
             if control.stop.requested() {
                 runs.ended = Some("stopped".into());
@@ -126,10 +128,10 @@ mod tests {
     }
 
     #[test]
-    fn every_trial_has_a_seed_of_its_own_and_the_first_is_warmed_up() {
-        let mut seen = Vec::new();
+    fn every_trial_has_a_seed_of_its_own_and_a_quick_first_one_is_made_again() {
+        let mut seen: Vec<(usize, Turn)> = Vec::new();
         let runs = run::<_, ()>(&settings(&[1.0, 2.0, 4.0]), &effort(4, None), Control::silent(), |index, turn| {
-            seen.push((index, turn.seed));
+            seen.push((index, turn));
             Ok(Trial { seconds: 1.0, errors: vec![index as f64] })
         })
         .expect("runs");
@@ -137,10 +139,27 @@ mod tests {
         assert!(runs.trials.iter().enumerate().all(|(i, t)| t.len() == 4 && t.iter().all(|t| t.errors[0] == i as f64)));
         let order: Vec<usize> = seen.iter().map(|s| s.0).collect();
         assert_eq!(order, [0, 0, 1, 2, 2, 1, 0, 0, 1, 2, 2, 1, 0], "one warm-up, then there and back");
-        let mut seeds: Vec<u64> = seen.iter().map(|s| s.1).collect();
+        assert!(seen.iter().enumerate().all(|(k, s)| s.1.again == (k == 1)));
+        assert_eq!(seen[0].1.seed, seen[1].1.seed);
+        let mut seeds: Vec<u64> = seen[1..].iter().map(|s| s.1.seed).collect();
         seeds.sort_unstable();
         seeds.dedup();
-        assert_eq!(seeds.len(), seen.len());
+        assert_eq!(seeds.len(), seen.len() - 1);
+    }
+
+    /// A machine on which the first trial takes longer than [`WARM`] counts the same ones.
+    #[test]
+    fn what_counts_does_not_depend_on_how_long_it_takes() {
+        let counted = |pause: Duration| {
+            let mut pause = Some(pause);
+            run::<_, ()>(&settings(&[1.0, 2.0]), &effort(3, None), Control::silent(), |_, turn| {
+                pause.take().into_iter().for_each(std::thread::sleep);
+                Ok(Trial { seconds: 1.0, errors: vec![turn.seed as f64] })
+            })
+            .expect("runs")
+            .trials
+        };
+        assert_eq!(counted(Duration::ZERO), counted(WARM));
     }
 
     #[test]

@@ -58,7 +58,7 @@ fn table(sweep: &Sweep, curve: &Curve) -> String {
         line(&mut text, curve, point, main, &others, first);
     }
     let kept =
-        curve.points.iter().filter_map(|p| Some(format!("{} in {} of {}", short(p.promise?), p.kept?, p.trials.len())));
+        curve.points.iter().filter_map(|p| Some(format!("{} in {} of {}", short(p.promise?), p.kept?, p.judged?)));
     let kept: Vec<String> = kept.collect();
     if !kept.is_empty() {
         text.push_str(&filled(&format!("  kept: {} at most {}", curve.main, kept.join(", ")), 4));

@@ -14,7 +14,7 @@ use crate::image::Image;
 use crate::measurement::Dimension;
 use crate::render::{self, Film, Options, Scene};
 use crate::tradeoff::fit::parameter_error;
-use crate::tradeoff::render::accumulate::{Gathered, Truth};
+use crate::tradeoff::render::accumulate::Truth;
 use crate::tradeoff::sweep::Trial;
 
 /// What is tried.
@@ -100,7 +100,7 @@ impl<'a> Links<'a> {
 
     /// The error against the reference, without its own.
     fn off(&self, image: &Image) -> f64 {
-        Gathered::default().add(&self.truth, image)
+        self.truth.error(image)
     }
 
     /// A material measured and fitted, and the time of the fit, s.

@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use super::curve::{About, Curve, Sweep, curves};
+use super::curve::{About, Beside, Curve, Sweep, curves};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::sweep::{Effort, Runs, Trial, run};
@@ -13,6 +13,7 @@ use crate::brdf::{Material, ModelSpec};
 use crate::chain::{ChainError, Stage};
 use crate::control::Control;
 use crate::gonio::{Instrument, Scan};
+use crate::numeric::estimate::median;
 
 mod links;
 mod shares;
@@ -68,7 +69,7 @@ pub fn sweep(what: &ChainSweep<'_>, effort: &Effort, control: Control<'_>) -> Re
     let mut links = Links::new(what, effort.seed, control)?;
     let (series, settings) = design(what, &links);
     let runs = run(&settings, effort, control, |index, turn| links.trial(settings[index].what, turn.seed))?;
-    let mut found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    let mut found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     let mut shares = shares::all(what, &settings, &runs);
     let (mut ended, notes) = (runs.ended, shares::notes(&shares));
     if ended.is_none() && !shares.is_empty() {
@@ -105,7 +106,7 @@ fn tried(
         .collect();
     let effort = Effort { seed: effort.seed ^ 0x5eed, ..*effort };
     let runs: Runs = run(&settings, &effort, control, |index, turn| links.trial(settings[index].what, turn.seed))?;
-    let found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    let found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     for point in found.iter().flat_map(|c| &c.points) {
         let own = shares.iter_mut().filter(|s| s.typed() == point.setting);
         own.for_each(|share| share.measured = point.errors[0]);
@@ -153,9 +154,9 @@ fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting
     (series, settings)
 }
 
-/// Mean square of the main errors, and the median time, of every setting with enough trials.
+/// Mean square of the main errors, and the median time, of a setting; `None` where it has no trial, or an error could not be told.
 fn summary(trials: &[Trial]) -> Option<(f64, f64)> {
-    let squares: Vec<f64> = trials.iter().map(|t| t.errors[0].powi(2)).filter(|s| !s.is_nan()).collect();
-    let seconds = crate::numeric::estimate::median(&trials.iter().map(|t| t.seconds).collect::<Vec<_>>())?.value;
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64, seconds))
+    let seconds = median(&trials.iter().map(|t| t.seconds).collect::<Vec<_>>())?.value;
+    let square = trials.iter().map(|t| t.errors[0].powi(2)).sum::<f64>() / trials.len() as f64;
+    (!square.is_nan()).then_some((square, seconds))
 }

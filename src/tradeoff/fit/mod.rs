@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use super::curve::{About, Sweep, curves};
+use super::curve::{About, Beside, Sweep, curves};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::sweep::{Effort, Trial, run};
@@ -84,7 +84,7 @@ pub fn sweep(
         let seconds = clock.elapsed().as_secs_f64();
         Ok::<_, ChainError>(Trial { seconds, errors: yardstick.errors(&fitted, way.model)? })
     })?;
-    let found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    let found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     let about = About {
         stage: "fit",
         subject: format!("{}, {} directions", measurement.name, measurement.len()),

@@ -7,7 +7,7 @@ use crate::numeric::estimate::{Estimate, moments, root_mean_square};
 use crate::numeric::stats::student_quantile;
 use crate::render::relative_squares;
 
-/// A picture's squared error must be this many times the reference's own.
+/// A picture's squared difference from the reference must be this many times the reference's own squared error.
 const CLEAR: f64 = 4.0;
 
 /// The reference: the mean of two pictures whose difference tells how good it is.
@@ -30,6 +30,24 @@ impl Truth {
         let off: Vec<DVec3> = a.radiance.iter().zip(&b.radiance).map(|(a, b)| half(a, b)).collect();
         truth.square = truth.norm(&off);
         truth
+    }
+
+    /// A picture's error without that of the reference; NaN where the two are too near to each other.
+    pub fn error(&self, image: &Image) -> f64 {
+        let square = self.norm(&self.off(image));
+        let clear = square > CLEAR * self.square || self.square == 0.0;
+        if clear { (square - self.square).sqrt() } else { f64::NAN }
+    }
+
+    /// What an error that could not be told stays below: the picture is no farther from the reference than the root of [`CLEAR`] of the reference's errors, and the
+    /// reference one of them from the truth.
+    pub fn untold(&self) -> f64 {
+        (CLEAR.sqrt() + 1.0) * self.square.sqrt()
+    }
+
+    fn off(&self, image: &Image) -> Vec<DVec3> {
+        let off = |(p, q): (&[f64; 3], &[f64; 3])| DVec3::from_array(*p) - DVec3::from_array(*q);
+        image.radiance.iter().zip(&self.image.radiance).map(off).collect()
     }
 
     pub fn image(&self) -> &Image {
@@ -65,16 +83,12 @@ pub(in crate::tradeoff) struct Gathered {
 }
 
 impl Gathered {
-    /// Adds a picture; its error without that of the reference, NaN where the two are too near to each other.
-    pub fn add(&mut self, truth: &Truth, image: &Image) -> f64 {
-        let off = |(p, q): (&[f64; 3], &[f64; 3])| DVec3::from_array(*p) - DVec3::from_array(*q);
-        let off: Vec<DVec3> = image.radiance.iter().zip(&truth.image.radiance).map(off).collect();
-        let square = truth.norm(&off);
-        self.squares.push(square);
+    /// Adds a picture.
+    pub fn add(&mut self, truth: &Truth, image: &Image) {
+        let off = truth.off(image);
+        self.squares.push(truth.norm(&off));
         self.sum.resize(off.len(), DVec3::ZERO);
         self.sum.iter_mut().zip(&off).for_each(|(sum, d)| *sum += *d);
-        let clear = square > CLEAR * truth.square || truth.square == 0.0;
-        if clear { (square - truth.square).sqrt() } else { f64::NAN }
     }
 
     /// The mean product of the differences of two trials: their noise is independent, so that it leaves the squared bias, with the reference's own
@@ -90,7 +104,11 @@ impl Gathered {
         let n = self.squares.len() as f64;
         let square = self.squares.iter().sum::<f64>() / n - self.shared(truth)?;
         let whole = root_mean_square(&self.squares.iter().map(|s| s.sqrt()).collect::<Vec<_>>())?;
-        let value = square.max(0.0).sqrt();
+        if square <= 0.0 || whole.value == 0.0 {
+            // No noise is seen: it is not more than all of the error.
+            return Some(Estimate { value: 0.0, low: 0.0, high: whole.high });
+        }
+        let value = square.sqrt();
         Some(Estimate { value, low: value * (whole.low / whole.value), high: value * (whole.high / whole.value) })
     }
 
@@ -100,7 +118,7 @@ impl Gathered {
     pub fn bias(&self, truth: &Truth) -> Option<Estimate> {
         let n = self.squares.len() as f64;
         let square = self.shared(truth)? - truth.square;
-        let (mean, deviation) = moments(&self.squares)?;
+        let (mean, deviation) = moments(&self.squares).filter(|m| m.0.is_finite() && m.1.is_finite())?;
         let (bias, noise) = (square.max(0.0), (mean - truth.square - square).max(0.0));
         let variance = deviation * deviation;
         let crossed = if bias > 0.0 { variance * 2.0 * bias / (noise + 2.0 * bias) } else { 0.0 };
@@ -132,7 +150,8 @@ mod tests {
         for (noise, bias) in [(0.2, 0.05), (0.2, 0.0), (0.05, 0.1)] {
             let truth = Truth::of(&noisy(1, 0.02, 0.0), &noisy(2, 0.02, 0.0));
             let mut gathered = Gathered::default();
-            let errors: Vec<f64> = (10..16).map(|seed| gathered.add(&truth, &noisy(seed, noise, bias))).collect();
+            let pictures = (10..16).map(|seed| noisy(seed, noise, bias));
+            let errors: Vec<f64> = pictures.inspect(|p| gathered.add(&truth, p)).map(|p| truth.error(&p)).collect();
             let error = root_mean_square(&errors).expect("errors").value * unit;
             // 4800 values scatter by 1 % of their root mean square, six times as many by 0.4 %.
             assert!((error / noise.hypot(bias) - 1.0).abs() < 0.02, "{error} of {noise} and {bias}");
@@ -147,7 +166,23 @@ mod tests {
     #[test]
     fn a_picture_as_good_as_the_reference_is_not_judged() {
         let truth = Truth::of(&noisy(1, 0.1, 0.0), &noisy(2, 0.1, 0.0));
-        assert!(Gathered::default().add(&truth, &noisy(3, 0.1, 0.0)).is_nan());
-        assert!(!Gathered::default().add(&truth, &noisy(3, 0.3, 0.0)).is_nan());
+        assert!(truth.error(&noisy(3, 0.1, 0.0)).is_nan());
+        assert!(!truth.error(&noisy(3, 0.3, 0.0)).is_nan());
+        // The mean of two pictures with noise of 0.1 each has 0.1/√2; that of 4800 values is known to 1 %.
+        let unit = 1.01f64.sqrt();
+        assert!((truth.untold() * unit / (3.0 * 0.1 * 0.5f64.sqrt()) - 1.0).abs() < 0.04, "{}", truth.untold());
+    }
+
+    #[test]
+    fn pictures_without_error_have_no_noise_and_endless_ones_no_estimate() {
+        let flat = noisy(1, 0.0, 0.0);
+        let truth = Truth::of(&flat, &flat);
+        let of = |picture: &Image| {
+            let mut gathered = Gathered::default();
+            (0..3).for_each(|_| gathered.add(&truth, picture));
+            [gathered.noise(&truth), gathered.bias(&truth)]
+        };
+        assert_eq!(of(&flat), [Some(Estimate::exact(0.0)); 2]);
+        assert_eq!(of(&noisy(1, 0.0, f64::INFINITY)), [None; 2]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::curve::{About, Sweep, curves};
+use super::curve::{About, Beside, Sweep, curves};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::sweep::{Effort, Trial, run};
@@ -135,7 +135,10 @@ pub fn sweep(
         if control.stop.requested() {
             return Ok(Trial { seconds, errors: vec![f64::NAN; 4] });
         }
-        let error = gathered[index].add(&truth, &image);
+        if !turn.again {
+            gathered[index].add(&truth, &image);
+        }
+        let error = truth.error(&image);
         let flip = compare(&image, truth.image())?.appearance.map_or(f64::NAN, |a| a.flip.mean);
         Ok::<_, ChainError>(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN, flip] })
     })?;
@@ -144,23 +147,24 @@ pub fn sweep(
         2 => gathered[index].bias(&truth),
         _ => None,
     };
-    let found = curves(&series, &settings, &MEASURES, &runs, &parts);
+    let beside = Beside { errors: &parts, untold: truth.untold() };
+    let found = curves(&series, &settings, &MEASURES, &runs, &beside);
     let smallest = runs.trials.iter().flatten().map(|t| t.errors[0]).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
     let about = About {
         stage: "render",
         subject: format!("{}, {width}×{height}", stage.spec.name),
         command: format!("goniofit render --scene {} --size {width}x{height}", stage.spec.name),
         reference: vec![truth.said(half, smallest)],
-        notes: notes(&runs.trials),
+        notes: notes(&runs.trials, truth.untold()),
     };
     Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
 }
 
-fn notes(trials: &[Vec<Trial>]) -> Vec<String> {
+fn notes(trials: &[Vec<Trial>], untold: f64) -> Vec<String> {
     let close = trials.iter().flatten().filter(|t| t.errors[0].is_nan()).count();
     let all: usize = trials.iter().map(Vec::len).sum();
     (close > 0)
-        .then(|| format!("{close} of {all} trials come too near to the reference to be judged: ask for a better one (--reference)"))
+        .then(|| format!("{close} of {all} trials come too near to the reference to be judged, and their settings have no error: ask for a better one (--reference). Such a trial is off by less than {untold:.1e}, and keeps a promise of more"))
         .into_iter()
         .collect()
 }

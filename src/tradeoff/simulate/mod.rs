@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::curve::{About, Sweep, curves};
+use super::curve::{About, Beside, Sweep, curves};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::sweep::{Effort, run};
@@ -67,7 +67,7 @@ pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) ->
     let mut bench = Bench::new(what, effort.seed, control);
     let (series, settings) = design(what);
     let runs = run(&settings, effort, control, |index, turn| bench.trial(&settings[index].what, turn))?;
-    let found = curves(&series, &settings, &MEASURES, &runs, &|_, _| None);
+    let found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     let about = About {
         stage: "simulate",
         subject: format!("{} along {}", what.name, what.scan),
