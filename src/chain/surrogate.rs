@@ -1,16 +1,21 @@
 //! What a material looks like to an instrument, about: a model fitted to readings, whose slopes tell what errors of positions do.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::lean;
-use crate::brdf::{LobeKind, LobeTerm, Material};
+use crate::brdf::{LobeKind, LobeTerm, Material, Sight};
 use crate::fit::{FitOptions, fit};
 use crate::gonio::Instrument;
 use crate::gonio::sight::Cones;
 use crate::measurement::{Dimension, Measurement};
 
-/// The model.
-const MODEL: &str = "lambert+phong+phong";
+/// The models: the second where residuals of the first are more than noise. A lobe that nothing calls for would fit the noise of single readings, and bend
+/// as no material does.
+const MODELS: [&str; 2] = ["lambert+phong", "lambert+phong+phong"];
+/// Share of the residuals' variance that may be structure.
+const STRUCTURED: f64 = 0.05;
 /// Share by which source and aperture may lower a lobe's peak before its slopes are not those of a lobe any more.
 const SMEARED: f64 = 0.05;
 /// How much larger the residual of a fit that conserves energy may be.
@@ -37,16 +42,13 @@ impl Surrogate {
 
     /// A plain fit, unless source, aperture and spot smear a lobe that stands out.
     fn fitted(readings: &Measurement, instrument: &Instrument) -> Option<Self> {
-        let options = FitOptions::new(MODEL.parse().ok()?);
-        let plain = within_reason(readings, &options)?;
+        let plain = simplest(readings, None)?;
         let cones = || Cones::of(instrument).filter(|_| readings.dimension == Dimension::Space);
         if let Some(cones) = cones().filter(|_| is_smeared(&plain, instrument)) {
-            let cones = std::sync::Arc::new(cones.rough());
-            let seen = FitOptions { through: Some(cones.clone()), profiles: false, ..options };
-            let fitted = within_reason(readings, &seen);
-            drop(seen);
+            let cones = Arc::new(cones.rough());
+            let fitted = simplest(readings, Some(cones.clone()));
             if let Some(material) = fitted {
-                return Some(Self { material, cones: std::sync::Arc::into_inner(cones) });
+                return Some(Self { material, cones: Arc::into_inner(cones) });
             }
         }
         Some(Self { material: plain, cones: None })
@@ -59,6 +61,21 @@ impl Surrogate {
             None => self.material.write_value(wi, wo, out),
         }
     }
+}
+
+/// The simplest of the models that leaves noise alone, else the last.
+fn simplest(readings: &Measurement, through: Option<Arc<dyn Sight>>) -> Option<Material> {
+    let is_noise = |of: &Material| {
+        let residual = of.fit.as_ref().and_then(|f| f.residual.as_ref());
+        residual.is_some_and(|r| r.structured_share <= STRUCTURED)
+    };
+    let fitted = |model: &str| {
+        let profiles = through.is_none();
+        let options = FitOptions { through: through.clone(), profiles, ..FitOptions::new(model.parse().ok()?) };
+        within_reason(readings, &options)
+    };
+    let [first, second] = MODELS;
+    fitted(first).filter(is_noise).or_else(|| fitted(second))
 }
 
 /// A fit. One that reflects more light than arrives, as a peak does of which saturated readings left the foot alone, is held to what arrives if that
