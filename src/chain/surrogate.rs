@@ -46,7 +46,9 @@ impl Surrogate {
         let cones = || Cones::of(instrument).filter(|_| readings.dimension == Dimension::Space);
         if let Some(cones) = cones().filter(|_| is_smeared(&plain, instrument)) {
             let cones = Arc::new(cones.rough());
-            let fitted = simplest(readings, Some(cones.clone()));
+            let sight: Arc<dyn Sight> = cones.clone();
+            let fitted = simplest(readings, Some(&sight));
+            drop(sight);
             if let Some(material) = fitted {
                 return Some(Self { material, cones: Arc::into_inner(cones) });
             }
@@ -64,14 +66,14 @@ impl Surrogate {
 }
 
 /// The simplest of the models that leaves noise alone, else the last.
-fn simplest(readings: &Measurement, through: Option<Arc<dyn Sight>>) -> Option<Material> {
+fn simplest(readings: &Measurement, through: Option<&Arc<dyn Sight>>) -> Option<Material> {
     let is_noise = |of: &Material| {
         let residual = of.fit.as_ref().and_then(|f| f.residual.as_ref());
         residual.is_some_and(|r| r.structured_share <= STRUCTURED)
     };
     let fitted = |model: &str| {
         let profiles = through.is_none();
-        let options = FitOptions { through: through.clone(), profiles, ..FitOptions::new(model.parse().ok()?) };
+        let options = FitOptions { through: through.cloned(), profiles, ..FitOptions::new(model.parse().ok()?) };
         within_reason(readings, &options)
     };
     let [first, second] = MODELS;
