@@ -2,8 +2,8 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use super::zero::swung;
 use super::{Block, Entry, Maker, Pass, stated};
+use crate::geometry::angles::turned;
 use crate::measurement::Dimension;
 use crate::numeric::random::{Purpose, stream};
 
@@ -32,8 +32,8 @@ impl Pass for Jitter {
             let mut draw = || -> f64 { self.sigma * Distribution::<f64>::sample(&StandardNormal, rng) };
             let [theta_i, phi_i, theta_o, phi_o] = [draw(), draw(), draw(), draw()];
             let round = if self.is_flat { 0.0 } else { 1.0 };
-            block.wi[i] = swung(block.wi[i], theta_i, round * phi_i);
-            block.wo[i] = swung(block.wo[i], theta_o, round * phi_o);
+            block.wi[i] = turned(block.wi[i], theta_i, round * phi_i);
+            block.wo[i] = turned(block.wo[i], theta_o, round * phi_o);
         }
     }
 }

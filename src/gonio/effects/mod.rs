@@ -22,7 +22,7 @@ mod shot;
 mod spot;
 mod stray;
 pub(super) mod tilt;
-pub(super) mod zero;
+mod zero;
 
 use glam::DVec3;
 

@@ -16,11 +16,11 @@ use super::bend::pairs;
 use super::effect::{Effect, draw, effects, is_bent, kept, place_all, place_of_stop};
 use super::shared::{HEIGHT, JITTER, Shared, TILT, ZEROS};
 use super::spread::Heights;
+use crate::geometry::angles::turned;
 use crate::gonio::effects::footprint::Footprint;
 use crate::gonio::effects::height::seen;
 use crate::gonio::effects::light::{Standard, reference_pair};
 use crate::gonio::effects::tilt::frame;
-use crate::gonio::effects::zero::swung;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::simulate::Truth;
@@ -103,7 +103,7 @@ impl<'a> Optics<'a> {
         let [theta_i, phi_i, theta_o, phi_o] = pose.zeros;
         let turn = frame(pose.tilt);
         let from_spot = |w: DVec3, theta: f64, phi: f64, distance: f64| {
-            seen(turn * swung(w, theta, phi), pose.height, distance, self.dimension)
+            seen(turn * turned(w, theta, phi), pose.height, distance, self.dimension)
         };
         let (wi, near_i) = from_spot(wi, theta_i, phi_i, self.instrument.source.distance_m);
         let (wo, near_o) = from_spot(wo, theta_o, phi_o, self.instrument.detector.distance_m);
