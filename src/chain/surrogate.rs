@@ -93,8 +93,7 @@ fn within_reason(readings: &Measurement, options: &FitOptions) -> Option<Materia
 
 /// Sum of the squares of both cones' half angles and of what the spot smears.
 fn spread(instrument: &Instrument) -> f64 {
-    let near = |distance: f64| if distance > 0.0 { 1.0 / distance } else { 0.0 };
-    let nearness = near(instrument.source.distance_m) + near(instrument.detector.distance_m);
+    let nearness = instrument.source.nearness() + instrument.detector.nearness();
     let spot = 0.5 * instrument.source.beam_diameter_m * nearness;
     instrument.source.half_angle().powi(2) + instrument.detector.half_angle().powi(2) + spot.powi(2)
 }

@@ -173,7 +173,18 @@ pub(super) fn shown(x: f64) -> String {
     if plain { format!("{x}") } else { format!("{x:e}") }
 }
 
+/// 1 over a distance, 1/m; 0 of what is far away, whose distance is 0.
+fn nearness(distance_m: f64) -> f64 {
+    if distance_m > 0.0 { 1.0 / distance_m } else { 0.0 }
+}
+
 impl Source {
+    /// 1 over its distance, 1/m; 0 of a collimated beam.
+    #[must_use]
+    pub fn nearness(&self) -> f64 {
+        nearness(self.distance_m)
+    }
+
     /// Half angle of the cone in which light reaches a point of the sample, rad.
     #[must_use]
     pub fn half_angle(&self) -> f64 {
@@ -210,6 +221,12 @@ impl Holder {
 }
 
 impl Detector {
+    /// 1 over its distance, 1/m; 0 where it is far away.
+    #[must_use]
+    pub fn nearness(&self) -> f64 {
+        nearness(self.distance_m)
+    }
+
     /// Half angle of the cone that the aperture takes in, rad.
     #[must_use]
     pub fn half_angle(&self) -> f64 {

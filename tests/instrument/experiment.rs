@@ -134,8 +134,7 @@ pub fn sigma(m: &Measurement, i: usize) -> f64 {
 fn width(instrument: &Instrument, [_, ks, n]: [f64; 3]) -> f64 {
     let cones = [instrument.source.divergence_deg, instrument.detector.aperture_deg].map(|full| (0.25 * full).powi(2));
     let own = if ks > 0.0 { n.sqrt().recip().to_degrees() } else { 10.0 };
-    let near = |distance: f64| if distance > 0.0 { 1.0 / distance } else { 0.0 };
-    let nearness = near(instrument.source.distance_m) + near(instrument.detector.distance_m);
+    let nearness = instrument.source.nearness() + instrument.detector.nearness();
     let spot = (0.25 * instrument.source.beam_diameter_m * nearness).to_degrees();
     (own * own + cones.iter().sum::<f64>() + spot * spot).sqrt()
 }

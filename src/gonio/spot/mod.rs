@@ -84,8 +84,7 @@ pub(super) struct View {
 impl Spot {
     /// That of an instrument; `None` where all of its spot sees one pair of directions.
     pub fn of(instrument: &Instrument, dimension: Dimension) -> Option<Self> {
-        let near = |distance: f64| if distance > 0.0 { 1.0 / distance } else { 0.0 };
-        let (source, detector) = (near(instrument.source.distance_m), near(instrument.detector.distance_m));
+        let (source, detector) = (instrument.source.nearness(), instrument.detector.nearness());
         let matters = instrument.source.beam_diameter_m > 0.0 && source + detector > 0.0;
         matters.then(|| Self { footprint: Footprint::of_beam(instrument, dimension), source, detector, dimension })
     }
