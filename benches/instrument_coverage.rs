@@ -1,6 +1,7 @@
 //! How often the 95 % intervals of reduced readings, and of parameters fitted to them, hold the truth over redrawn instruments, their own errors
 //! drawn too: `cargo bench --bench instrument_coverage` prints a Markdown table and exits with 1 where a mean leaves 93 to 97 %;
-//! `-- --quick` redraws a tenth, `-- NAME…` takes only built-in instruments and materials of these names.
+//! `-- --quick` redraws a tenth, `-- NAME…` takes only built-in instruments and materials of these names. Of a parameter, instruments of which no interval is
+//! stated don't miss it.
 #![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
 
 use std::time::Instant;
@@ -9,7 +10,7 @@ use std::time::Instant;
 #[path = "../tests/instrument/experiment.rs"]
 mod experiment;
 
-use experiment::{CLASSES, Experiment, coverage};
+use experiment::{CLASSES, Experiment, Held, coverage};
 use goniofit::geometry::angles::theta_of;
 use goniofit::gonio::PRESETS;
 
@@ -50,7 +51,7 @@ fn main() {
                 )
             };
             let three =
-                |p: [Option<f64>; 3]| p.map(|s| s.map_or("–".into(), |s| format!("{:.1}", 100.0 * s))).join(", ");
+                |p: [Option<Held>; 3]| p.map(|held| held.map_or("–".into(), |held| held.to_string())).join(", ");
             println!(
                 "| {} | {class} | {} | {:.1} % | {} | {} | {:.2} to {:.2} | {} | {} |",
                 preset.name,

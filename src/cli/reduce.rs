@@ -16,7 +16,7 @@ use super::ui::Ui;
 use crate::chain;
 use crate::chain::ChainError;
 use crate::control::counted;
-use crate::gonio::{Instrument, Line, Raw, Reduction};
+use crate::gonio::{Instrument, Line, Raw, Reduction, Type};
 use crate::measurement::Dimension;
 use crate::measurement::formats::{flat_deg, push_number, spherical_deg};
 
@@ -101,11 +101,20 @@ fn summary(out: &Path, raw: &Raw, reduction: &Reduction, valid: u64) -> String {
     );
     // Writing to a String can't fail.
     let rms = format!("rms [{}]", unit(table.dimension));
-    let _ = write!(text, "\n  {:<34} type {rms:>12}   of a reading (median)", "component, one σ");
+    let _ = write!(
+        text,
+        "\n  {:<28} {:>16}  {:>11}  {rms:>10}  {:>7}",
+        "component, type", "one σ", "sensitivity", "median"
+    );
     for line in reduction.budget.lines.iter().map(unsigned) {
         let kind = if line.name == TOTAL { "" } else { line.kind.name() };
-        let _ = write!(text, "\n  {:<34} {kind:<4} {:>12.3e}   {:>8.3} %", line.name, line.rms, 100.0 * line.relative);
+        let name = format!("{:<28} {kind:<1}", line.name);
+        let u = line.u.map_or_else(String::new, |u| format!("{u:.2e} {:<6}", line.unit));
+        let sensitivity = line.sensitivity.map_or_else(String::new, |c| format!("{c:.2e}"));
+        let _ =
+            write!(text, "\n  {name}  {u:>15}  {sensitivity:>9}  {:>10.2e}  {:>6.3}%", line.rms, 100.0 * line.relative);
     }
+    let _ = write!(text, "\n  one σ of a rate is in signals a second; median is of a reading's value");
     text
 }
 
@@ -126,7 +135,15 @@ fn by_reading(raw: &Raw, reduction: &Reduction) -> String {
     for line in parts {
         let _ = write!(text, ",{} ({}) [{}]", line.name, line.kind.name(), unit(table.dimension));
     }
-    let _ = writeln!(text, ",all together [{}]", unit(table.dimension));
+    let _ = write!(text, ",all together [{}]", unit(table.dimension));
+    // Of noise one σ is another in each reading, so there is no one coefficient.
+    let described: Vec<(usize, f64)> =
+        parts.iter().enumerate().filter(|(_, l)| l.kind == Type::B).filter_map(|(k, l)| Some((k, l.u?))).collect();
+    for (k, _) in &described {
+        let by = Some(parts[*k].unit).filter(|u| !u.is_empty()).map_or_else(String::new, |u| format!(" by {u}"));
+        let _ = write!(text, ",sensitivity to {} [{}{by}]", parts[*k].name, unit(table.dimension));
+    }
+    text.push('\n');
     for i in 0..table.len() {
         let (wi, wo) = raw.directions.pair(i);
         for (c, channel) in table.channels.iter().enumerate() {
@@ -144,6 +161,7 @@ fn by_reading(raw: &Raw, reduction: &Reduction) -> String {
             let of: Vec<f64> = (0..parts.len()).map(|k| reduction.budget.contribution(k, place) + 0.0).collect();
             of.iter().for_each(|u| push_number(&mut text, *u));
             push_number(&mut text, of.iter().map(|u| u * u).fold(0.0, |a, b| a + b).sqrt());
+            described.iter().for_each(|(k, u)| push_number(&mut text, of[*k] / u));
             text.pop(); // the last comma
             text.push('\n');
         }

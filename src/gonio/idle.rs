@@ -10,6 +10,7 @@ pub fn idle(instrument: &Instrument, channels: &[String]) -> Vec<String> {
     let no_reference = !instrument.has_reference();
     let (no_beam, no_distance) =
         (source.beam_diameter_m == 0.0, source.distance_m == 0.0 && detector.distance_m == 0.0);
+    let unseen = no_beam && sample.height_u_m == 0.0;
     let list = [
         (reference.reflectance_u > 0.0 && no_reference, "reference.reflectance_u", "reference.reflectance above 0"),
         (reference.shape > 0.0 && no_reference, "reference.shape", "reference.reflectance above 0"),
@@ -17,6 +18,12 @@ pub fn idle(instrument: &Instrument, channels: &[String]) -> Vec<String> {
             sample.height_u_m > 0.0 && no_distance,
             "sample.height_u_m",
             "detector.distance_m or source.distance_m above 0",
+        ),
+        (source.distance_m > 0.0 && unseen, "source.distance_m", "source.beam_diameter_m or sample.height_u_m above 0"),
+        (
+            detector.distance_m > 0.0 && unseen,
+            "detector.distance_m",
+            "source.beam_diameter_m or sample.height_u_m above 0",
         ),
         (sample.diameter_m > 0.0 && no_beam, "sample.diameter_m", "source.beam_diameter_m above 0"),
         (detector.field_diameter_m > 0.0 && no_beam, "detector.field_diameter_m", "source.beam_diameter_m above 0"),
@@ -34,6 +41,7 @@ pub fn idle(instrument: &Instrument, channels: &[String]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::gonio::PRESETS;
+    use crate::gonio::parts::Detector;
 
     #[test]
     fn what_does_nothing_says_what_it_needs_and_built_in_instruments_have_no_such_thing() {
@@ -46,6 +54,12 @@ mod tests {
         instrument.reference.reflectance_u = 0.01;
         instrument.sample.height_u_m = 1e-4;
         instrument.source.bandwidth_nm = 5.0;
+        let far = Instrument { detector: Detector { distance_m: 0.5, ..Detector::default() }, ..Instrument::default() };
+        let said_of_far = idle(&far, &spectrum);
+        assert!(
+            said_of_far.len() == 1 && said_of_far[0].contains("detector.distance_m does nothing"),
+            "{said_of_far:?}"
+        );
         let said = idle(&instrument, &["r".into()]);
         for (key, needs) in [
             ("reference.reflectance_u", "reference.reflectance "),

@@ -3,7 +3,7 @@
 use rand_distr::{Distribution, Normal, Poisson};
 
 use super::parts::{Axes, Detector, Holder, Protocol, Reference, Source, Surroundings, shown};
-use super::reduce::positions;
+use super::reduce::{positions, saturation_limit};
 use crate::numeric::random::{Purpose, stream};
 
 /// Standard uncertainty of the sample's height over the distance of source or detector, at most.
@@ -98,6 +98,7 @@ impl Instrument {
             self.protocol.fault(),
             self.height_fault(),
             self.beam_fault(),
+            self.well_fault(),
         ];
         none().or_else(|| parts.into_iter().flatten().next())
     }
@@ -124,6 +125,20 @@ impl Instrument {
             shown(distance),
             shown(beam)
         ))
+    }
+
+    /// A full well that noise and rounding fill would leave no reading that is safe from saturation.
+    fn well_fault(&self) -> Option<String> {
+        let Detector { full_well, nonlinearity_u, .. } = self.detector;
+        (full_well > 0.0 && saturation_limit(self) <= 0.0).then(|| {
+            let margin = full_well * (1.0 - 4.0 * nonlinearity_u) - saturation_limit(self);
+            format!(
+                "instrument.detector.full_well: expected more than {}, or no reading is safe from saturation (five times read_noise and a step of the \
+                 converter, over 1 − 4 nonlinearity_u), found {}",
+                shown(margin / (1.0 - 4.0 * nonlinearity_u)),
+                shown(full_well)
+            )
+        })
     }
 
     /// Whether nothing but the detector's noise is described, so that no raw readings are needed to know what comes back.
@@ -234,7 +249,7 @@ mod tests {
             change(&mut instrument);
             instrument.fault().unwrap_or_default()
         };
-        let cases: [(Change, &str); 10] = [
+        let cases: [(Change, &str); 11] = [
             (
                 |i| i.electrons = 1e-300,
                 "instrument.electrons: expected 0 (no noise) or a number from 1e-3 to 1e15, found 1e-300",
@@ -260,6 +275,11 @@ mod tests {
             (
                 |i| i.detector.full_well = 1e-9,
                 "instrument.detector.full_well: expected 0 (never saturates) or a number from 1 to 1e18",
+            ),
+            // Five times a read noise of 10 over 1 − 4·0.1.
+            (
+                |i| (i.detector.full_well, i.detector.nonlinearity_u) = (80.0, 0.1),
+                "instrument.detector.full_well: expected more than 83.33333333333333, or no reading is safe from saturation",
             ),
             (
                 |i| i.detector.nonlinearity_u = 0.3,

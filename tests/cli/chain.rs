@@ -230,7 +230,11 @@ fn raw_readings_reduce_to_the_measurement_and_fit_within_its_errors() {
     assert!(first.contains("common_1_r") && again.contains("common_1_r"));
     let lines = told["budget"].as_array().expect("a budget");
     let of = |name: &str| lines.iter().find(|l| l["name"] == name).unwrap_or_else(|| panic!("{name} in {lines:?}"));
-    assert!((number(&of("certificate of the reference")["relative"]) - 0.003).abs() < 1e-12);
+    let certificate = of("certificate of the reference");
+    assert!((number(&certificate["relative"]) - 0.003).abs() < 1e-12 && number(&certificate["u"]) == 0.003);
+    let (rms, u, sensitivity) = (&certificate["rms"], &certificate["u"], &certificate["sensitivity"]);
+    assert!((number(rms) / number(u) / number(sensitivity) - 1.0).abs() < 1e-12);
+    assert!(of("all together")["u"].is_null());
     assert!(number(&of("all together")["relative"]) > 0.003);
     assert!(b.text("budget.csv").lines().count() > 500);
     b.ok(&["fit", "again.csv", "--out", "fit.json"]);
@@ -241,6 +245,26 @@ fn raw_readings_reduce_to_the_measurement_and_fit_within_its_errors() {
     assert!(number(&range[0]) < 0.30 && number(&range[1]) > 0.30, "{range}");
     // The certificate's 0.3 % is in the error of a weight of 0.3.
     assert!(number(&file["fit"]["standard_error"][0]["weight"][2]) > 0.8e-3, "{}", file["fit"]["standard_error"]);
+}
+
+/// A laboratory that knows its certificate but not its detector: σ comes from the repeats, and what is missing where there are none is said.
+#[test]
+fn repeats_tell_the_noise_of_a_detector_that_nobody_described() {
+    let b = Bench::new();
+    let known = "[instrument.reference]\nreflectance = 0.985\nreflectance_u = 0.003\n";
+    b.write("known.toml", &format!("version = 1\n[instrument]\nelectrons = 0\n{known}"));
+    for (readings, stated) in [("5", true), ("1", false)] {
+        let all = format!("version = 1\n[instrument]\nelectrons = 1e5\nreadings = {readings}\n{known}");
+        b.write("lab.toml", &format!("{all}[instrument.protocol]\nrepeats = 1\n"));
+        let simulate = ["simulate", "--material", "satin", "--instrument", "lab.toml", "--scan", "in-plane:5"];
+        b.ok(&[&simulate[..], &["--raw", "raw.csv", "--out", "first.csv"]].concat());
+        let ran = b.run(&["reduce", "raw.csv", "--instrument", "known.toml", "--out", "m.csv"]);
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert_eq!(b.text("m.csv").contains("sigma_r"), stated);
+        let said = "σ is not stated: the detector's noise is not described";
+        assert_eq!(ran.err.contains(said), !stated, "{}", ran.err);
+        assert_eq!(ran.text().contains("noise of the reading"), stated, "{}", ran.text());
+    }
 }
 
 #[test]

@@ -37,7 +37,8 @@ const ACCURACY: f64 = 1e-4;
 pub struct Outcome {
     /// Reading by reading: error and σ; nothing where it is masked.
     pub readings: Vec<Option<(f64, f64)>>,
-    /// Whether the intervals of kd, ks and n hold them, of a fit at face value and of one through the instrument; `None` where there is none.
+    /// Whether the intervals of kd, ks and n hold them, of a fit at face value and of one through the instrument; `None` where none is stated, which
+    /// says nothing that could be false.
     pub parameters: [[Option<bool>; 3]; 2],
 }
 
@@ -164,9 +165,26 @@ pub struct Coverage {
     pub most: (f64, usize),
     /// Width between the 2.5 % and 97.5 % quantiles of the errors, over that of the mean interval: least and most of the readings.
     pub quantiles: (f64, f64),
-    /// Of kd, ks and n, at face value and through the instrument.
-    pub parameters: [[Option<f64>; 3]; 2],
+    /// Of kd, ks and n, at face value and through the instrument; `None` where none of them is ever stated.
+    pub parameters: [[Option<Held>; 3]; 2],
     pub readings: usize,
+}
+
+/// Of a parameter's intervals.
+#[derive(Debug, Clone, Copy)]
+pub struct Held {
+    /// Share of the instruments of which one is stated: elsewhere the data don't determine the parameter, and the fit says so.
+    pub stated: f64,
+    /// Share of the instruments of which none is stated that misses the truth. Not a share of those that are stated: which instruments let a parameter
+    /// look determined hangs on the same noise.
+    pub held: f64,
+}
+
+impl std::fmt::Display for Held {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.1}", 100.0 * self.held)?;
+        if self.stated < 1.0 { write!(f, " ({:.0} stated)", 100.0 * self.stated) } else { Ok(()) }
+    }
 }
 
 /// Redraws instruments of these seeds.
@@ -189,8 +207,10 @@ pub fn coverage(of: &Experiment, seeds: std::ops::Range<u64>) -> Coverage {
         })
     };
     let parameter = |way: usize, p: usize| {
-        let known: Vec<bool> = runs.iter().filter_map(|run| run.parameters[way][p]).collect();
-        (!known.is_empty()).then(|| known.iter().filter(|held| **held).count() as f64 / known.len() as f64)
+        let stated: Vec<bool> = runs.iter().filter_map(|run| run.parameters[way][p]).collect();
+        let missed = stated.iter().filter(|held| !**held).count();
+        let share = |count: usize| count as f64 / runs.len() as f64;
+        (!stated.is_empty()).then(|| Held { stated: share(stated.len()), held: 1.0 - share(missed) })
     };
     Coverage {
         mean: list.iter().map(|l| l.0).sum::<f64>() / list.len() as f64,

@@ -17,6 +17,7 @@ mod plan;
 mod planned;
 mod presets;
 mod raw;
+mod repeats;
 mod rows;
 mod spot;
 mod support;

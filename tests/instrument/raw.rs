@@ -123,3 +123,17 @@ fn a_walk_that_no_reference_tells_is_shared_as_far_as_it_is() {
         assert!(apart > want * (1.0 - 1e-9) && apart < want + 2.0 * own, "{i} {j}: {apart:e} {want:e}");
     }
 }
+
+/// A pair that was read at several stops and in several channels is one pair, whichever of its channels is masked.
+#[test]
+fn a_masked_pair_counts_once() {
+    let header = HEADER.replace("signal_y", "signal_a,signal_b");
+    let rows = "0,0,30,0,sample,0,1,0,5,\n0,0,60,0,sample,1,1,0,,\n0,0,30,0,sample,2,1,0,6,\n10,0,60,0,sample,3,1,0,7,8\n0,0,100,0,sample,4,1,0,1,1\n\
+                0,0,20,0,sample,5,1,0,1,\n0,0,20,0,sample,6,1,0,,1\n";
+    let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{header}{rows}")).expect("valid");
+    let m = goniofit::gonio::reduce("m", &raw, &Instrument::noiseless(), None).expect("reduced").measurement;
+    // Of 20° each channel was read once.
+    let counts: Vec<&str> =
+        m.notes.iter().filter(|n| n.contains("masked")).map(|n| &n[..n.find(':').unwrap()]).collect();
+    assert_eq!(counts, ["2 pairs of directions are masked", "1 pair of directions is masked"], "{:?}", m.notes);
+}

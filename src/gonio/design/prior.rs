@@ -24,7 +24,7 @@ pub struct Prior {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Wrong {
-    /// The flat world has no instrument with parts.
+    /// Candidates are pairs of directions in space.
     #[error("model {0} belongs to the flat world: expected lobes of space, found {0}")]
     Flat(ModelSpec),
     /// A name that the model does not have.

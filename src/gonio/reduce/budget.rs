@@ -32,6 +32,13 @@ pub struct Line {
     /// How it is known.
     #[serde(rename = "type")]
     pub kind: Type,
+    /// Standard uncertainty of what a reading depends on, in `unit`: as described (type B), or root of the mean square over all readings (type A). None of
+    /// all together.
+    pub u: Option<f64>,
+    /// Its unit; rates are signals a second, walks their standard deviation after an hour. Empty where it is relative.
+    pub unit: &'static str,
+    /// Sensitivity coefficient, `rms` over `u`: 1/sr by `unit`.
+    pub sensitivity: Option<f64>,
     /// Standard uncertainty that it brings to a reading, root of the mean square over all valid readings, 1/sr.
     pub rms: f64,
     /// The same relative to each reading, median over the readings.
@@ -48,12 +55,14 @@ pub struct Budget {
 }
 
 impl Budget {
-    pub(super) fn new(parts: Vec<(&'static str, Type, Vec<f64>)>, values: &[f64]) -> Self {
-        let parts: Vec<_> = parts.into_iter().filter(|(_, _, v)| v.iter().any(|v| *v > 0.0)).collect();
-        let total: Vec<f64> = (0..values.len()).map(|i| parts.iter().map(|(_, _, v)| v[i]).sum()).collect();
-        let mut lines: Vec<Line> = parts.iter().map(|(name, kind, v)| line(name, *kind, v, values)).collect();
-        lines.push(line("all together", Type::Both, &total, values));
-        Self { lines, variances: parts.into_iter().map(|(_, _, v)| v).collect() }
+    /// From components, each with its variance in every reading.
+    pub(super) fn new(parts: Vec<(Input, Vec<f64>)>, values: &[f64]) -> Self {
+        let parts: Vec<_> = parts.into_iter().filter(|(_, v)| v.iter().any(|v| *v > 0.0)).collect();
+        let total: Vec<f64> = (0..values.len()).map(|i| parts.iter().map(|(_, v)| v[i]).sum()).collect();
+        let mut lines: Vec<Line> = parts.iter().map(|(input, v)| line(*input, v, values)).collect();
+        let all = Input { name: "all together", kind: Type::Both, u: None, unit: "" };
+        lines.push(line(all, &total, values));
+        Self { lines, variances: parts.into_iter().map(|(_, v)| v).collect() }
     }
 
     /// Standard uncertainty that component `line` brings to reading `place` (channel-major).
@@ -63,11 +72,21 @@ impl Budget {
     }
 }
 
-fn line(name: &'static str, kind: Type, variances: &[f64], values: &[f64]) -> Line {
+/// What readings depend on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Input {
+    pub name: &'static str,
+    pub kind: Type,
+    pub u: Option<f64>,
+    pub unit: &'static str,
+}
+
+fn line(Input { name, kind, u, unit }: Input, variances: &[f64], values: &[f64]) -> Line {
     let valid = || values.iter().zip(variances).filter(|(v, _)| v.is_finite());
     let count = valid().count().max(1) as f64;
     let rms = (valid().map(|(_, u)| u).sum::<f64>() / count).sqrt();
     let mut shares: Vec<f64> = valid().filter(|(v, _)| **v != 0.0).map(|(v, u)| u.sqrt() / v.abs()).collect();
     shares.sort_by(f64::total_cmp);
-    Line { name, kind, rms, relative: shares.get(shares.len() / 2).copied().unwrap_or(0.0) }
+    let relative = shares.get(shares.len() / 2).copied().unwrap_or(0.0);
+    Line { name, kind, u, unit, sensitivity: u.map(|u| rms / u), rms, relative }
 }

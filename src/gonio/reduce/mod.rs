@@ -8,6 +8,7 @@ mod alike;
 mod bend;
 mod budget;
 mod effect;
+mod noise;
 pub(super) mod positions;
 mod shared;
 mod spread;
@@ -19,6 +20,7 @@ use glam::DVec3;
 pub use budget::{Budget, Line, Type};
 pub(super) use stops::limit as saturation_limit;
 
+use self::noise::Noise;
 use self::shared::Shared;
 use self::stops::{Rate, Stop};
 use self::visits::Visits;
@@ -96,7 +98,9 @@ pub fn reduce(
     instrument: &Instrument,
     model: Option<&Truth<'_>>,
 ) -> Result<Reduction, ReduceError> {
-    let stops = stops::stops(raw, instrument);
+    let summaries = stops::summaries(raw, instrument);
+    let noise = Noise::of(raw, &summaries, instrument);
+    let stops: Vec<Stop> = summaries.iter().map(|summary| summary.stop(&noise, instrument)).collect();
     let has_reference = stops.iter().any(|s| s.kind == Kind::Reference);
     if !stops.iter().any(|s| s.kind == Kind::Sample) {
         return Err(ReduceError::NoSample);
@@ -106,7 +110,11 @@ pub fn reduce(
         return Err(if has_reference { ReduceError::NoCertificate } else { unread() });
     }
     let visits = Visits::new(&stops, raw, instrument)?;
-    Ok(Work { raw, instrument, scale: Scale::new(instrument, raw.dimension), visits }.run(name, &stops, model))
+    let said = noise.note(raw, &summaries, instrument);
+    let work = Work { raw, instrument, noise, scale: Scale::new(instrument, raw.dimension), visits };
+    let mut reduction = work.run(name, &stops, model);
+    reduction.measurement.notes.extend(said);
+    Ok(reduction)
 }
 
 /// What turns a net rate into a BRDF.
@@ -165,16 +173,17 @@ fn mean_cos(instrument: &Instrument, dimension: Dimension) -> f64 {
 struct Work<'a> {
     raw: &'a Raw,
     instrument: &'a Instrument,
+    noise: Noise,
     scale: Scale,
     visits: Visits,
 }
 
-/// Why entries have no value.
-#[derive(Default)]
-struct Left {
-    saturated: u64,
-    shadowed: u64,
-    unlit: u64,
+/// Why a pair has no value, in one of its channels at least.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Left {
+    Saturated,
+    Shadowed,
+    Unlit,
 }
 
 impl Work<'_> {
@@ -183,7 +192,7 @@ impl Work<'_> {
         let mut table = Table { values: vec![f64::NAN; n * width], variance: vec![0.0; n * width] };
         let end_s = self.raw.readings.last().map_or(0.0, |r| r.time_s + r.exposure_s);
         let mut shared = Shared::new(n, width, (&self.visits, end_s), self.instrument);
-        let mut left = Left::default();
+        let mut left = vec![None; n];
         let samples: Vec<(&Stop, usize)> = stops
             .iter()
             .filter(|s| s.kind == Kind::Sample)
@@ -201,9 +210,9 @@ impl Work<'_> {
             positions::add(self.raw, self.instrument, model, &mut table, &mut shared);
         }
         let budget = shared.budget(&table);
-        let row = shared.row(&table, width).filter(|_| self.instrument.is_noisy());
+        let row = shared.row(&table, width).filter(|_| self.noise.is_known());
         shared.own_into(&mut table);
-        let mut notes = left.notes(width);
+        let mut notes = Left::notes(&left);
         if model.is_none() && positions::matter(self.instrument) {
             notes.push(
                 "errors of positions are not in σ: there was no model of the material to tell their effect".into(),
@@ -212,11 +221,11 @@ impl Work<'_> {
         let marked = table.values.iter().filter(|v| v.is_nan()).count() as u64;
         let measurement = Measurement {
             notes,
-            origin: format!("reduced from {} readings", self.raw.readings.len()),
+            origin: format!("reduced from {} readings{}", self.raw.readings.len(), self.noise.said()),
             dimension: self.raw.dimension,
             weights: self.raw.weights.clone(),
             masked: Masked { marked, ..Masked::default() },
-            sigma: self.instrument.is_noisy().then(|| table.sigma()),
+            sigma: self.noise.is_known().then(|| table.sigma()),
             common: shared.planes(),
             row,
             ..Measurement::new(name, self.raw.directions.clone(), self.raw.channels.clone(), table.values)
@@ -232,7 +241,7 @@ impl Work<'_> {
         times: &[u32],
         table: &mut Table,
         shared: &mut Shared<'_>,
-        left: &mut Left,
+        left: &mut [Option<Left>],
     ) {
         let (wi, wo) = self.raw.directions.pair(entry);
         let factor = self.scale.of(wi, wo);
@@ -240,15 +249,17 @@ impl Work<'_> {
         for (c, rate) in stop.rates.iter().enumerate() {
             let place = c * n + entry;
             if may_be_shadowed(wi, wo, self.instrument) {
-                left.shadowed += 1;
+                left[entry] = Some(Left::Shadowed);
                 continue;
             }
             if !factor.is_finite() || wi.z <= 0.0 || wo.z <= 0.0 {
-                left.unlit += 1;
+                left[entry] = Some(Left::Unlit);
                 continue;
             }
             let &Some(rate) = rate else {
-                left.saturated += u64::from(times[place] == 0);
+                if times[place] == 0 {
+                    left[entry] = Some(Left::Saturated);
+                }
                 continue;
             };
             let at = self.visits.at(stop.time_s, c);
@@ -287,20 +298,20 @@ struct Reduced {
 }
 
 impl Left {
-    fn notes(&self, width: usize) -> Vec<String> {
-        let pairs = |count: u64, why: &str| {
-            let count = count.div_ceil(width.max(1) as u64);
-            match count {
-                0 => None,
-                1 => Some(format!("1 pair of directions is masked: {why}")),
-                _ => Some(format!("{count} pairs of directions are masked: {why}")),
-            }
+    fn notes(all: &[Option<Self>]) -> Vec<String> {
+        let pairs = |left: Self, why: &str| match all.iter().filter(|l| **l == Some(left)).count() {
+            0 => None,
+            1 => Some(format!("1 pair of directions is masked: {why}")),
+            count => Some(format!("{count} pairs of directions are masked: {why}")),
         };
         let list = [
-            pairs(self.saturated, "even the shortest exposure saturated, or nothing was read"),
-            pairs(self.shadowed, "source and detector shadow each other there, or may"),
             pairs(
-                self.unlit,
+                Self::Saturated,
+                "even the shortest exposure saturated, or nothing was read, in one channel at least",
+            ),
+            pairs(Self::Shadowed, "source and detector shadow each other there, or may"),
+            pairs(
+                Self::Unlit,
                 "below the horizon, or no light of the beam counts there, or the spot reaches up to source or detector",
             ),
         ];

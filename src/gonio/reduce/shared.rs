@@ -5,7 +5,7 @@
 //! of the variance is common and the rest counts as each reading's own, which keeps the variance of a reading and of the mean over the group.
 
 use super::alike::alike;
-use super::budget::{Budget, Type};
+use super::budget::{Budget, Input, Type};
 use super::visits::{Gap, Visits};
 use super::{Reduced, Table};
 use crate::gonio::instrument::Instrument;
@@ -29,10 +29,25 @@ struct Component {
 struct Family {
     name: &'static str,
     kind: Type,
+    unit: &'static str,
+    /// Sum of squares of its input's σ over what was read, and how often.
+    read: (f64, f64),
     /// Variance that is not in any component, by reading; empty for none.
     own: Vec<f64>,
     /// Its part of components and variances that belong to several, by reading; empty for none.
     attributed: Vec<f64>,
+}
+
+impl Family {
+    fn was_read(&mut self, variance: f64) {
+        self.read.0 += variance;
+        self.read.1 += 1.0;
+    }
+
+    /// σ of its readings, root of the mean square.
+    fn rms(&self) -> f64 {
+        (self.read.0 / self.read.1).sqrt()
+    }
 }
 
 /// All of them.
@@ -66,18 +81,19 @@ pub(super) const ZEROS: usize = 7;
 pub(super) const TILT: usize = 8;
 pub(super) const HEIGHT: usize = 9;
 pub(super) const JITTER: usize = 10;
-const NAMES: [(&str, Type); 11] = [
-    ("noise of the reading", Type::A),
-    ("noise of the reference's readings", Type::A),
-    ("noise of blank and dark", Type::A),
-    ("certificate of the reference", Type::B),
-    ("source drift", Type::B),
-    ("dark drift", Type::B),
-    ("nonlinearity", Type::B),
-    ("axis zeros", Type::B),
-    ("sample tilt", Type::B),
-    ("sample height", Type::B),
-    ("axis jitter", Type::B),
+/// Name, how it is known, and the unit of what readings depend on.
+const NAMES: [(&str, Type, &str); 11] = [
+    ("noise of the reading", Type::A, "1/s"),
+    ("noise of the reference", Type::A, "1/s"),
+    ("noise of blank and dark", Type::A, "1/s"),
+    ("certificate of the reference", Type::B, ""),
+    ("source drift", Type::B, "1/√h"),
+    ("dark drift", Type::B, "1/s/√h"),
+    ("nonlinearity", Type::B, ""),
+    ("axis zeros", Type::B, "°"),
+    ("sample tilt", Type::B, "°"),
+    ("sample height", Type::B, "m"),
+    ("axis jitter", Type::B, "°"),
 ];
 
 impl<'a> Shared<'a> {
@@ -85,7 +101,14 @@ impl<'a> Shared<'a> {
         let size = entries * width;
         let afforded = (MOST_NUMBERS / size.max(1) / (2 * width + 2 * MODES + 1)).clamp(1, MOST_GROUPS);
         let families = NAMES
-            .map(|(name, kind)| Family { name, kind, own: Vec::new(), attributed: Vec::new() })
+            .map(|(name, kind, unit)| Family {
+                name,
+                kind,
+                unit,
+                read: (0.0, 0.0),
+                own: Vec::new(),
+                attributed: Vec::new(),
+            })
             .into_iter()
             .collect();
         Self {
@@ -176,11 +199,14 @@ impl<'a> Shared<'a> {
     pub fn reading(&mut self, place: usize, channel: usize, of: &Reduced) {
         let Reduced { value, conversion, rate, ref at, .. } = *of;
         self.add_own(READING, place, conversion * conversion * rate.variance);
+        self.families[READING].was_read(rate.variance);
         for part in &at.reference_parts {
+            self.families[REFERENCE].was_read(part.sigma * part.sigma);
             let u = -value / at.reference * part.share * part.sigma;
             self.add_grouped(REFERENCE, part.number, channel, place, u);
         }
         for part in &at.base_parts {
+            self.families[BASE].was_read(part.sigma * part.sigma);
             let u = (value / at.reference * part.through_reference - conversion * part.direct) * part.sigma;
             self.add_grouped(BASE, part.number, channel, place, u);
         }
@@ -266,8 +292,28 @@ impl<'a> Shared<'a> {
             let Some(family) = family else { continue };
             variances[*family].iter_mut().zip(plane).for_each(|(to, u)| *to += u * u);
         }
-        let lines = self.families.iter().zip(variances).map(|(f, variance)| (f.name, f.kind, variance));
+        let input = |k: usize| {
+            let Family { name, kind, unit, .. } = self.families[k];
+            Input { name, kind, u: Some(self.uncertainty(k)), unit }
+        };
+        let lines = variances.into_iter().enumerate().map(|(k, variance)| (input(k), variance));
         Budget::new(lines.collect(), &table.values)
+    }
+
+    /// Standard uncertainty of what a family's readings depend on.
+    fn uncertainty(&self, family: usize) -> f64 {
+        let Instrument { source, sample, detector, reference, axes, .. } = self.instrument;
+        match family {
+            CERTIFICATE => reference.reflectance_u,
+            DRIFT => source.drift_per_sqrt_hour,
+            DARK => detector.dark_drift_per_sqrt_hour,
+            NONLINEARITY => detector.nonlinearity_u,
+            ZEROS => axes.zero_u_deg,
+            TILT => sample.tilt_u_deg,
+            HEIGHT => sample.height_u_m,
+            JITTER => axes.jitter_deg,
+            _ => self.families[family].rms(),
+        }
     }
 
     /// The components' planes.

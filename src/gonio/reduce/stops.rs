@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::noise::Noise;
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
@@ -32,38 +33,87 @@ pub(super) struct Stop {
     pub rates: Vec<Option<Rate>>,
 }
 
+/// Repeats of one exposure at a stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Repeats {
+    pub exposure_s: f64,
+    pub count: usize,
+    /// Mean signal.
+    pub signal: f64,
+    /// Variance of one about it; 0 of a single one.
+    pub scatter: f64,
+}
+
+/// What the readings of a stop come to.
+#[derive(Debug, Clone)]
+pub(super) struct Summary {
+    kind: Kind,
+    entry: Option<u32>,
+    pub time_s: f64,
+    /// From the first reading's beginning to the last one's end.
+    pub seconds: f64,
+    /// Channel by channel: the longest exposure that does not saturate.
+    pub repeats: Vec<Option<Repeats>>,
+}
+
+impl Summary {
+    /// With the noise of its readings.
+    pub fn stop(&self, noise: &Noise, instrument: &Instrument) -> Stop {
+        let of = |(c, repeats): (usize, &Option<Repeats>)| {
+            repeats.map(|r| rate(&r, noise.variance(c, r.signal), instrument))
+        };
+        let rates = self.repeats.iter().enumerate().map(of).collect();
+        Stop { kind: self.kind, entry: self.entry, time_s: self.time_s, rates }
+    }
+}
+
 /// Readings by stop, in order of time.
-pub(super) fn stops(raw: &Raw, instrument: &Instrument) -> Vec<Stop> {
+pub(super) fn summaries(raw: &Raw, instrument: &Instrument) -> Vec<Summary> {
     let mut first = 0;
     let runs = raw.readings.chunk_by(|a, b| a.stop == b.stop);
     runs.map(|run| {
-        let stop = combined(raw, instrument, first, run);
+        let summary = combined(raw, instrument, first, run);
         first += run.len();
-        stop
+        summary
     })
     .collect()
 }
 
-fn combined(raw: &Raw, instrument: &Instrument, first: usize, run: &[Reading]) -> Stop {
+fn combined(raw: &Raw, instrument: &Instrument, first: usize, run: &[Reading]) -> Summary {
     let mut exposures: Vec<f64> = run.iter().map(|reading| reading.exposure_s).collect();
     exposures.sort_by(|a, b| b.total_cmp(a));
     exposures.dedup();
+    let limit = limit(instrument);
     let channel = |c: usize| {
         // The longest exposure of which no reading saturates; a repeat that was not read counts for nothing.
         exposures.iter().find_map(|exposure| {
             let of_exposure = run.iter().enumerate().filter(|(_, reading)| reading.exposure_s == *exposure);
             let all = of_exposure.map(|(i, _)| raw.signals(first + i)[c]);
             let signals: Vec<f64> = all.filter(|s| !s.is_nan()).collect();
-            let usable = !signals.is_empty() && signals.iter().all(|s| *s < limit(instrument));
-            usable.then(|| rate(&signals, *exposure, instrument))
+            let usable = !signals.is_empty() && signals.iter().all(|s| *s < limit);
+            usable.then(|| Repeats::of(&signals, *exposure))
         })
     };
     let end = run[run.len() - 1];
-    Stop {
+    let end_s = end.time_s + end.exposure_s;
+    Summary {
         kind: run[0].kind,
         entry: run[0].entry,
-        time_s: 0.5 * (run[0].time_s + end.time_s + end.exposure_s),
-        rates: (0..raw.channels.len()).map(channel).collect(),
+        time_s: 0.5 * (run[0].time_s + end_s),
+        seconds: end_s - run[0].time_s,
+        repeats: (0..raw.channels.len()).map(channel).collect(),
+    }
+}
+
+impl Repeats {
+    fn of(signals: &[f64], exposure_s: f64) -> Self {
+        let count = signals.len();
+        let signal = signals.iter().sum::<f64>() / count as f64;
+        // From the first, so that equal ones scatter by nothing.
+        let off = |s: &f64| s - signals[0];
+        let mean_off = signals.iter().map(off).sum::<f64>() / count as f64;
+        let squares: f64 = signals.iter().map(|s| (off(s) - mean_off).powi(2)).sum();
+        Self { exposure_s, count, signal, scatter: squares / (count - 1).max(1) as f64 }
     }
 }
 
@@ -76,13 +126,11 @@ pub(in crate::gonio) fn limit(instrument: &Instrument) -> f64 {
     detector.full_well * (1.0 - 4.0 * detector.nonlinearity_u) - 5.0 * instrument.read_noise - step(detector)
 }
 
-/// The mean of readings of one exposure. Shot noise is that of the mean (at least one electron's worth), what the description says comes on top.
-fn rate(signals: &[f64], exposure: f64, instrument: &Instrument) -> Rate {
-    let count = signals.len() as f64;
-    let signal = signals.iter().sum::<f64>() / count;
-    let noise = if instrument.is_noisy() { signal.max(1.0) + instrument.read_noise.powi(2) } else { 0.0 };
+/// The mean of readings of one exposure, each with a variance of `noise` and what rounding adds.
+fn rate(of: &Repeats, noise: f64, instrument: &Instrument) -> Rate {
+    let (count, exposure) = (of.count as f64, of.exposure_s);
     let variance = noise / count + rounding(noise, count, step(&instrument.detector));
-    Rate { mean: signal / exposure, variance: variance / (exposure * exposure), signal }
+    Rate { mean: of.signal / exposure, variance: variance / (exposure * exposure), signal: of.signal }
 }
 
 /// Variance of the mean of `count` readings by their rounding to steps: of step²/12 the share that repeats have in common does not average out.
