@@ -12,6 +12,7 @@
 //! 2.6e6 for 1.6°) are sums over points that stand too far apart.
 
 mod disc;
+mod seats;
 mod seen;
 mod table;
 
@@ -22,6 +23,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use self::disc::{Disc, power_of_alpha};
+use self::seats::{Kept, Seat};
 use self::seen::{Seen, Tables};
 use super::instrument::Instrument;
 use super::spot::{FINEST, Spot, View};
@@ -68,6 +70,8 @@ pub struct Cones {
     tables: Option<Arc<Tables>>,
     spot: Option<Spot>,
     finesse: Finesse,
+    /// What fits ask for again and again.
+    kept: Kept,
 }
 
 impl Cones {
@@ -84,7 +88,7 @@ impl Cones {
         let wide = source.half > 0.0 || detector.half > 0.0;
         let any = wide || spot.is_some();
         let tables = || wide.then(|| Tables::of(source, detector));
-        any.then(|| Self { source, detector, tables: tables(), spot, finesse: FINE })
+        any.then(|| Self { source, detector, tables: tables(), spot, finesse: FINE, kept: Kept::default() })
     }
 
     /// The same, with means over the spot to 1e-4 of each lobe's peak: enough to tell what errors of positions do.
@@ -136,7 +140,8 @@ impl Cones {
     pub fn write_value(&self, material: &Material, wi: DVec3, wo: DVec3, out: &mut [f64]) {
         let Some(place) = self.place(wi, wo) else { return material.write_value(wi, wo, out) };
         out.fill(0.0);
-        let mut views = Views::new(self, place);
+        // The points of the last order that a lobe asked for.
+        let mut at: (Option<usize>, Vec<Seat>) = (None, Vec::new());
         for term in &material.lobes {
             // Channels mostly share their shape.
             let mut last = (f64::NAN, 0.0);
@@ -144,7 +149,13 @@ impl Cones {
                 let Some(shape) = term.shape_of(c) else { continue };
                 let value = match shape[..] {
                     [n] if n == last.0 => last.1,
-                    [n] => views.read(n, self.seen(n).as_deref()).0,
+                    [n] => {
+                        let order = self.order(&place, n);
+                        if order != at.0 {
+                            at = (order, self.seats(&place, order));
+                        }
+                        self.mean(self.seen(n).as_deref(), n, &place, &at.1).0
+                    }
                     _ => term.kind.lobe().value(&[], 0.0, &mut []),
                 };
                 last = (shape.first().copied().unwrap_or(f64::NAN), value);
@@ -175,80 +186,38 @@ impl Cones {
         let scale = 1.0 / (TAU * self.mean_cos());
         ((n + 2.0) * scale * value, ((n + 2.0) * slope + value) * scale)
     }
-}
 
-/// A pair of directions as points of the spot see it, by the orders that lobes ask for.
-struct Views<'a> {
-    cones: &'a Cones,
-    place: Place,
-    by_order: Vec<(usize, Vec<Seat>)>,
-}
-
-/// From one point: α, cosθi/cosθo, and what it counts.
-struct Seat {
-    alpha: f64,
-    ratio: f64,
-    weight: f64,
-}
-
-impl<'a> Views<'a> {
-    fn new(cones: &'a Cones, place: Place) -> Self {
-        Self { cones, place, by_order: Vec::new() }
-    }
-
-    /// The mean of [`Cones::read`] over the spot, what reflects more light counting more; that of the middle where the spot has no extent.
-    fn read(&mut self, n: f64, seen: Option<&Seen>) -> (f64, f64) {
-        let (cones, place) = (self.cones, self.place);
-        let Some(spot) = &cones.spot else { return cones.read(seen, n, place.alpha, place.ratio) };
-        let order = self.order(spot, n);
-        let at = self.by_order.iter().position(|(of, _)| *of == order).unwrap_or_else(|| {
-            self.by_order.push((order, views(spot, &place, order)));
-            self.by_order.len() - 1
-        });
-        self.by_order[at].1.iter().fold((0.0, 0.0), |sums, view| {
-            let (value, slope) = cones.read(seen, n, view.alpha, view.ratio);
-            (sums.0 + view.weight * value, sums.1 + view.weight * slope)
+    /// The mean of [`Self::read`] over the spot, what reflects more light counting more; that of the middle without points.
+    fn mean(&self, seen: Option<&Seen>, n: f64, place: &Place, seats: &[Seat]) -> (f64, f64) {
+        if seats.is_empty() {
+            return self.read(seen, n, place.alpha, place.ratio);
+        }
+        seats.iter().fold((0.0, 0.0), |sums, seat| {
+            let (value, slope) = self.read(seen, n, seat.alpha, seat.ratio);
+            (sums.0 + seat.weight * value, sums.1 + seat.weight * slope)
         })
     }
 
-    /// The order that a lobe asks for: that of cosines where it is nothing.
-    fn order(&self, spot: &Spot, n: f64) -> usize {
-        let Place { alpha, smear, wi, wo, .. } = self.place;
-        let smooth = spot.smooth_order((wi, wo), self.cones.finesse.error);
-        if alpha > self.cones.source.half + self.cones.detector.half + smear + NOWHERE / n.sqrt() {
-            return smooth;
+    /// The order of the rule over the spot that a lobe asks for; `None` where the middle tells all: without a spot, and where the lobe is nothing.
+    fn order(&self, place: &Place, n: f64) -> Option<usize> {
+        let spot = self.spot.as_ref()?;
+        let Place { alpha, smear, wi, wo, .. } = *place;
+        if alpha > self.source.half + self.detector.half + smear + NOWHERE / n.sqrt() {
+            return None;
         }
-        let Finesse { order: (least, per_width), most, blurred, .. } = self.cones.finesse;
-        let width = n.sqrt().recip().hypot(blurred * self.cones.source.half.min(self.cones.detector.half));
-        ((least + per_width * smear / width).ceil() as usize).min(most).max(smooth)
+        let Finesse { error, order: (least, per_width), most, blurred } = self.finesse;
+        let width = n.sqrt().recip().hypot(blurred * self.source.half.min(self.detector.half));
+        let order = (least + per_width * smear / width).ceil() as usize;
+        Some(order.min(most).max(spot.smooth_order((wi, wo), error)))
     }
-}
 
-/// The points of a rule, what they count adding up to 1.
-fn views(spot: &Spot, place: &Place, order: usize) -> Vec<Seat> {
-    let (mut list, mut all) = (Vec::new(), 0.0);
-    spot.points((place.wi, place.wo), order, |point| {
-        let (alpha, ratio) = (near_angle(mirror(point.wi), point.wo), point.wi.z / point.wo.z);
-        let weight = point.weight * point.wo.z;
-        all += weight;
-        list.push(Seat { alpha, ratio, weight });
-    });
-    list.iter_mut().for_each(|view| view.weight /= all);
-    list
-}
-
-/// Chord up to which the series of its angle is good to 1e-14.
-const SHORT: f64 = 0.1;
-
-/// The angle between two unit vectors, by the series of its chord where that is short.
-fn near_angle(a: DVec3, b: DVec3) -> f64 {
-    let squared = (a - b).length_squared();
-    if squared > SHORT * SHORT {
-        return angle_between(a, b);
+    /// The points of the spot by the rule of an order, what they count adding up to 1; none without one.
+    fn seats(&self, place: &Place, order: Option<usize>) -> Vec<Seat> {
+        match (&self.spot, order) {
+            (Some(spot), Some(order)) => seats::of(spot, place, order),
+            _ => Vec::new(),
+        }
     }
-    let series = 1.0
-        + squared * (1.0 / 24.0 + squared * (3.0 / 640.0 + squared * (5.0 / 7168.0 + squared * (35.0 / 294_912.0))));
-    squared.sqrt() * series
 }
 
 impl Sight for Cones {
@@ -278,7 +247,9 @@ impl Sight for Cones {
         };
         let seen = self.seen(n);
         for (i, place) in places.iter().enumerate() {
-            (values[i], slopes[i]) = Views::new(self, *place).read(n, seen.as_deref());
+            let order = self.order(place, n);
+            let seats = order.map(|order| self.kept.get(place, order, || self.seats(place, Some(order))));
+            (values[i], slopes[i]) = self.mean(seen.as_deref(), n, place, seats.as_deref().unwrap_or_default());
         }
     }
 }
