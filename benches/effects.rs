@@ -17,11 +17,12 @@ use rayon::prelude::*;
 /// An effect, and what brings it.
 type Part = (&'static str, fn(&mut Instrument));
 
-const PARTS: [Part; 15] = [
+const PARTS: [Part; 16] = [
     ("axis zeros", |i| i.axes.zero_u_deg = 0.05),
     ("axis jitter", |i| i.axes.jitter_deg = 0.02),
     ("sample tilt", |i| i.sample.tilt_u_deg = 0.05),
     ("sample height", |i| (i.sample.height_u_m, i.detector.distance_m) = (1e-4, 0.5)),
+    ("spot extent", |i| (i.source.beam_diameter_m, i.detector.distance_m) = (0.01, 0.5)),
     ("source divergence", |i| i.source.divergence_deg = 0.2),
     ("detector aperture", |i| i.detector.aperture_deg = 1.0),
     ("footprint", |i| (i.source.beam_diameter_m, i.sample.diameter_m) = (0.01, 0.02)),
@@ -97,7 +98,12 @@ fn by_hand() -> f64 {
 
 /// Parts that ask for what an effect alone would have: where it goes, they do too.
 fn built_on(name: &str) -> &'static [&'static str] {
-    if name == "saturation" { &["nonlinearity", "quantisation"] } else { &[] }
+    match name {
+        "saturation" => &["nonlinearity", "quantisation"],
+        // Whose distance shows the spot from its side.
+        "spot extent" => &["sample height"],
+        _ => &[],
+    }
 }
 
 fn once(args: &[String]) {
