@@ -17,7 +17,7 @@ use rayon::prelude::*;
 /// An effect, and what brings it.
 type Part = (&'static str, fn(&mut Instrument));
 
-const PARTS: [Part; 16] = [
+const PARTS: [Part; 17] = [
     ("axis zeros", |i| i.axes.zero_u_deg = 0.05),
     ("axis jitter", |i| i.axes.jitter_deg = 0.02),
     ("sample tilt", |i| i.sample.tilt_u_deg = 0.05),
@@ -30,6 +30,7 @@ const PARTS: [Part; 16] = [
     ("stray light", |i| i.surroundings.stray_per_sr = 2e-3),
     ("source drift", |i| i.source.drift_per_sqrt_hour = 5e-3),
     ("dark current", |i| i.detector.dark_per_s = 200.0),
+    ("electronic offset", |i| i.detector.offset = 50.0),
     ("saturation", |i| i.detector.full_well = 1e9),
     ("nonlinearity", |i| (i.detector.full_well, i.detector.nonlinearity_u) = (1e9, 0.003)),
     ("read noise", |i| i.read_noise = 8.0),

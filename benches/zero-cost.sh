@@ -33,7 +33,7 @@ compare "all, against a bare loop" "$(count ideal)" "$(count by-hand)"
 shift || true
 effects=("$@")
 [ ${#effects[@]} -gt 0 ] || effects=("axis zeros" "axis jitter" "sample tilt" "sample height" "spot extent" "source divergence" "detector aperture" "footprint" "shadow"
-  "stray light" "source drift" "dark current" "saturation" "nonlinearity" "read noise" "quantisation")
+  "stray light" "source drift" "dark current" "electronic offset" "saturation" "nonlinearity" "read noise" "quantisation")
 for effect in "${effects[@]}"; do
   judge "$effect" "$(count left-out "$effect")" "$(count without "$effect")"
 done

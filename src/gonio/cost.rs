@@ -56,12 +56,12 @@ pub(super) fn visit_s(instrument: &Instrument) -> f64 {
 /// Seconds of the readings of a visit.
 fn still_s(instrument: &Instrument) -> f64 {
     let exposures = &instrument.detector.exposures_s;
-    let longest = exposures.last().copied().unwrap_or(1.0);
+    let of_base = || instrument.base_exposures_s().iter().sum();
     let once =
         |present: bool, seconds: f64| if present { f64::from(instrument.protocol.repeats) * seconds } else { 0.0 };
     once(instrument.has_reference(), exposures.iter().sum())
-        + once(instrument.surroundings.stray_per_sr > 0.0, longest)
-        + once(instrument.has_dark(), longest)
+        + once(instrument.surroundings.stray_per_sr > 0.0, of_base())
+        + once(instrument.has_dark(), of_base())
 }
 
 #[cfg(test)]

@@ -83,9 +83,11 @@ impl Instrument {
         }
         let none = || (self.readings == 0).then(|| "instrument.readings: expected at least 1, found 0".to_owned());
         let detector = &self.detector;
-        let counts = detector.dark_per_s + detector.dark_drift_per_sqrt_hour + detector.full_well > 0.0;
+        let counts =
+            detector.dark_per_s + detector.dark_drift_per_sqrt_hour + detector.offset + detector.full_well > 0.0;
         let unit = (!self.is_noisy() && counts).then(|| {
-            "instrument.electrons: what counts electrons (dark, full_well) needs a number above 0, found 0".into()
+            "instrument.electrons: what counts electrons (dark, offset, full_well) needs a number above 0, found 0"
+                .into()
         });
         let parts = [
             unit,
@@ -129,12 +131,12 @@ impl Instrument {
 
     /// A full well that noise and rounding fill would leave no reading that is safe from saturation.
     fn well_fault(&self) -> Option<String> {
-        let Detector { full_well, nonlinearity_u, .. } = self.detector;
-        (full_well > 0.0 && saturation_limit(self) <= 0.0).then(|| {
-            let margin = full_well * (1.0 - 4.0 * nonlinearity_u) - saturation_limit(self);
+        let Detector { full_well, nonlinearity_u, offset, .. } = self.detector;
+        (full_well > 0.0 && saturation_limit(self) <= offset).then(|| {
+            let margin = offset + full_well * (1.0 - 4.0 * nonlinearity_u) - saturation_limit(self);
             format!(
-                "instrument.detector.full_well: expected more than {}, or no reading is safe from saturation (five times read_noise and a step of the \
-                 converter, over 1 − 4 nonlinearity_u), found {}",
+                "instrument.detector.full_well: expected more than {}, or no reading is safe from saturation (offset, five times read_noise and a step of \
+                 the converter, over 1 − 4 nonlinearity_u), found {}",
                 shown(margin / (1.0 - 4.0 * nonlinearity_u)),
                 shown(full_well)
             )
@@ -165,7 +167,15 @@ impl Instrument {
     /// Whether the closed shutter must be read.
     #[must_use]
     pub fn has_dark(&self) -> bool {
-        self.detector.dark_per_s > 0.0 || self.detector.dark_drift_per_sqrt_hour > 0.0
+        let Detector { dark_per_s, dark_drift_per_sqrt_hour, offset, .. } = self.detector;
+        dark_per_s > 0.0 || dark_drift_per_sqrt_hour > 0.0 || offset > 0.0
+    }
+
+    /// Exposures in which blank and dark are read: the longest, whose rates are known best, and all where each has an offset of its own.
+    #[must_use]
+    pub fn base_exposures_s(&self) -> &[f64] {
+        let all = &self.detector.exposures_s;
+        if self.detector.offset > 0.0 { all } else { &all[all.len().saturating_sub(1)..] }
     }
 
     /// Electrons a second of a BRDF of 1/sr at cosθo = 1: 1 where the detector is without noise and its signal in no unit.

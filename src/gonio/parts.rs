@@ -61,6 +61,8 @@ pub struct Detector {
     pub dark_per_s: f64,
     /// Random walk of the dark current, electrons a second, standard deviation after an hour.
     pub dark_drift_per_sqrt_hour: f64,
+    /// What the electronics add to each reading, however long its exposure, electrons. Dark and blank are read in all exposures then.
+    pub offset: f64,
     /// Electrons at which a reading saturates; 0 is never.
     pub full_well: f64,
     /// Bits of the converter, whose last step is full_well/(2^bits − 1); 0 is one without steps.
@@ -79,6 +81,7 @@ impl Default for Detector {
             field_diameter_m: 0.0,
             dark_per_s: 0.0,
             dark_drift_per_sqrt_hour: 0.0,
+            offset: 0.0,
             full_well: 0.0,
             bits: 0,
             nonlinearity_u: 0.0,
@@ -240,6 +243,7 @@ impl Detector {
             ("aperture_deg", self.aperture_deg, 60.0),
             ("dark_per_s", self.dark_per_s, 1e15),
             ("dark_drift_per_sqrt_hour", self.dark_drift_per_sqrt_hour, 1e15),
+            ("offset", self.offset, 1e15),
             ("bits", f64::from(self.bits), 32.0),
             // From a quarter on no signal is safe from saturation.
             ("nonlinearity_u", self.nonlinearity_u, 0.2),

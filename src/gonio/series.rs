@@ -33,9 +33,10 @@ pub const MOST_READINGS: f64 = 5e7;
 pub fn readings(instrument: &Instrument, pairs: usize) -> f64 {
     let exposures = instrument.detector.exposures_s.len() as f64;
     let once = |present: bool, count: f64| if present { count } else { 0.0 };
+    let of_base = instrument.base_exposures_s().len() as f64;
     let of_visit = once(instrument.has_reference(), exposures)
-        + once(instrument.surroundings.stray_per_sr > 0.0, 1.0)
-        + once(instrument.has_dark(), 1.0);
+        + once(instrument.surroundings.stray_per_sr > 0.0, of_base)
+        + once(instrument.has_dark(), of_base);
     let visits = pairs.div_ceil(instrument.protocol.block.max(1) as usize) as f64 + 1.0;
     pairs as f64 * exposures * f64::from(instrument.readings)
         + visits * of_visit * f64::from(instrument.protocol.repeats)
@@ -85,23 +86,23 @@ impl Series<'_> {
     /// Reads what readings of the sample are compared with, as far as the instrument needs it.
     fn visit(&mut self) {
         let instrument = self.instrument;
-        let exposures = &instrument.detector.exposures_s;
-        let longest = exposures.last().copied().unwrap_or(1.0);
-        let repeats = instrument.protocol.repeats;
         if instrument.has_reference() {
             self.go(self.moves.reference());
-            for &exposure in exposures {
-                self.read(Kind::Reference, None, exposure, repeats);
-            }
+            self.all(Kind::Reference, &instrument.detector.exposures_s);
         }
         if instrument.surroundings.stray_per_sr > 0.0 {
             self.stop += 1;
-            self.read(Kind::Blank, None, longest, repeats);
+            self.all(Kind::Blank, instrument.base_exposures_s());
         }
         if instrument.has_dark() {
             self.stop += 1;
-            self.read(Kind::Dark, None, longest, repeats);
+            self.all(Kind::Dark, instrument.base_exposures_s());
         }
+    }
+
+    /// Reads one thing in these exposures, as often as a visit does.
+    fn all(&mut self, kind: Kind, exposures: &[f64]) {
+        exposures.iter().for_each(|&exposure| self.read(kind, None, exposure, self.instrument.protocol.repeats));
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::support::*;
 use goniofit::brdf::Material;
 use goniofit::gonio::Instrument;
+use goniofit::gonio::parts::Detector;
 use rayon::prelude::*;
 
 /// How often, of all readings of `seeds` instruments, value ± 1.96 σ holds the truth, and the least of any one reading.
@@ -41,6 +42,8 @@ fn check(name: &str, of: &Material, instrument: &Instrument) {
 fn readings_by_an_instrument_with_drift_dark_stray_light_and_a_certificate_hold_the_truth() {
     check("matte", &material(0.8, 0.0, 1.0), &lab());
     check("glossy", &material(0.2, 0.1, 60.0), &lab());
+    let detector = Detector { offset: 2e3, ..lab().detector };
+    check("glossy, an electronic offset", &material(0.2, 0.1, 60.0), &Instrument { detector, ..lab() });
 }
 
 #[test]

@@ -113,6 +113,7 @@ fn drift_dark_read_noise_and_nonlinearity_fade_in_proportion() {
         own_orders("source drift", source, 0.01),
         own_orders("dark current", dark, 100.0),
         own_orders("dark drift", walk, 100.0),
+        own_orders("electronic offset", |x| detector(Detector { offset: x, ..Detector::default() }), 100.0),
         own_orders("read noise", noise, 10.0),
         own_orders("nonlinearity", bent, 0.01),
     ] {

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
+use crate::experiment::sigma;
 use crate::support::*;
+use goniofit::control::Control;
+use goniofit::gonio::parts::Detector;
 use goniofit::gonio::{Instrument, Raw};
 use goniofit::measurement::Directions;
 
@@ -122,6 +125,45 @@ fn a_walk_that_no_reference_tells_is_shared_as_far_as_it_is() {
         let own = 1e-4 * 1.02 / 8.0 / 4.0;
         assert!(apart > want * (1.0 - 1e-9) && apart < want + 2.0 * own, "{i} {j}: {apart:e} {want:e}");
     }
+}
+
+/// Electronics that add 50 to every reading: dark and blank of the same exposure have them too, those of another do not tell.
+#[test]
+fn what_is_subtracted_is_of_the_same_exposure() {
+    let base = |kind: &str, time: u32| format!(",,,,{kind},{time},0.1,0,51\n,,,,{kind},{},1,0,60\n", time + 1);
+    let sample = |angle: u32, time: u32, exposure: f64, rate: f64| {
+        format!("0,0,{angle},0,sample,{time},{exposure},0,{}\n", 50.0 + exposure * (rate + 10.0))
+    };
+    let rows = [base("dark", 0), sample(30, 4, 0.1, 1000.0), sample(60, 5, 1.0, 30.0), base("dark", 8)].concat();
+    let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}{rows}")).expect("valid");
+    let m = goniofit::gonio::reduce("m", &raw, &Instrument::noiseless(), None).expect("reduced").measurement;
+    let cos = |deg: f64| deg.to_radians().cos();
+    let (a, b) = (m.value(0, 0).expect("valid") * cos(30.0), m.value(0, 1).expect("valid") * cos(60.0));
+    assert!((a - 1000.0).abs() < 1e-9 && (b - 30.0).abs() < 1e-9, "{a} {b}");
+}
+
+/// An instrument whose electronics have an offset reads what one without it does, in every exposure, and is as sure.
+#[test]
+fn an_electronic_offset_comes_off() {
+    let (satin, scan) = (material(0.2, 0.1, 200.0), in_plane(5.0));
+    let exact = Instrument { electrons: 1e6, ..faultless() };
+    let offset = |offset: f64| Instrument {
+        detector: Detector { offset, full_well: 2e6, ..exact.detector.clone() },
+        ..exact.clone()
+    };
+    let of = |instrument: &Instrument| {
+        let raw = with_job(&satin, instrument, &scan, 1, &["shot noise"], |job| job.run(Control::silent()));
+        reduced(&raw, instrument, &satin).measurement
+    };
+    let (without, with) = (of(&offset(0.0)), of(&offset(3e4)));
+    let mut read = 0;
+    for i in 0..with.len() {
+        let (Some(a), Some(b)) = (without.value(0, i), with.value(0, i)) else { continue };
+        assert!((a / b - 1.0).abs() < 1e-9, "{i}: {a} {b}");
+        assert!(sigma(&with, i) < 1.2 * sigma(&without, i) + 1e-12, "{i}");
+        read += 1;
+    }
+    assert!(read > 150, "{read}");
 }
 
 /// A pair that was read at several stops and in several channels is one pair, whichever of its channels is masked.

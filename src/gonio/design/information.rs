@@ -75,7 +75,7 @@ impl<'a> Noise<'a> {
         if !(rate > 0.0 && wi.z > 0.0) {
             return None;
         }
-        let most = saturation_limit(instrument);
+        let most = saturation_limit(instrument) - instrument.detector.offset;
         // Half of what chance puts above the limit would be lost at it: five σ below it nothing is.
         let fits = |t: &&f64| {
             let signal = (f * rate + more) * **t;

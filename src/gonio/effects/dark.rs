@@ -7,7 +7,7 @@ pub(super) const EFFECT: Entry = Entry {
     calls: |i, _| {
         let (mean, drift) = (i.detector.dark_per_s, i.detector.dark_drift_per_sqrt_hour);
         let said = format!("detector.dark_per_s = {mean}, dark_drift_per_sqrt_hour = {drift}");
-        if i.has_dark() { Ok(said) } else { Err(said) }
+        if mean > 0.0 || drift > 0.0 { Ok(said) } else { Err(said) }
     },
     remove: |i| (i.detector.dark_per_s, i.detector.dark_drift_per_sqrt_hour) = (0.0, 0.0),
     make: |maker: &Maker<'_>| {

@@ -13,6 +13,7 @@ pub(super) mod height;
 mod jitter;
 pub(super) mod light;
 mod nonlinearity;
+mod offset;
 mod power;
 pub(super) mod quantisation;
 mod read_noise;
@@ -112,8 +113,8 @@ const GEOMETRY: [Entry; 7] =
 /// Effects on the flux, electrons a second.
 const FLUX: [Entry; 6] = [band::EFFECT, footprint::EFFECT, shadow::EFFECT, stray::EFFECT, power::EFFECT, dark::EFFECT];
 /// Effects on the electrons of a reading.
-const DETECTOR: [Entry; 5] =
-    [shot::EFFECT, saturation::EFFECT, nonlinearity::EFFECT, read_noise::EFFECT, quantisation::EFFECT];
+const DETECTOR: [Entry; 6] =
+    [shot::EFFECT, offset::EFFECT, saturation::EFFECT, nonlinearity::EFFECT, read_noise::EFFECT, quantisation::EFFECT];
 
 fn effects() -> impl Iterator<Item = &'static Entry> {
     GEOMETRY.iter().chain(&FLUX).chain(&DETECTOR)

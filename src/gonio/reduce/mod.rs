@@ -262,7 +262,7 @@ impl Work<'_> {
                 }
                 continue;
             };
-            let at = self.visits.at(stop.time_s, c);
+            let at = self.visits.at(stop.time_s, c, rate.exposure_s);
             let share = 1.0 / f64::from(times[place]);
             let conversion = share * factor / at.reference;
             let value = conversion * (rate.mean - at.base);

@@ -24,8 +24,8 @@ const SURE: f64 = 5.0;
 
 /// What is known of the noise of one reading.
 pub(super) enum Noise {
-    /// Shot noise, at least one electron's worth, and the electronics' variance.
-    Described { read: f64 },
+    /// Shot noise of what is above the electronics' offset, at least one electron's worth, and the electronics' variance.
+    Described { read: f64, offset: f64 },
     /// Curves of the channels, and the degrees of freedom behind the least sure one.
     Scattered { curves: Vec<Curve>, freedom: f64 },
     /// Nothing, and why.
@@ -36,7 +36,7 @@ impl Noise {
     /// What description and repeats tell.
     pub fn of(raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Self {
         if instrument.is_noisy() {
-            return Self::Described { read: instrument.read_noise.powi(2) };
+            return Self::Described { read: instrument.read_noise.powi(2), offset: instrument.detector.offset };
         }
         let (mut curves, mut least) = (Vec::new(), f64::INFINITY);
         for (c, channel) in raw.channels.iter().enumerate() {
@@ -59,7 +59,7 @@ impl Noise {
     /// Variance of one reading; 0 where nothing is known.
     pub fn variance(&self, channel: usize, signal: f64) -> f64 {
         match self {
-            Self::Described { read } => signal.max(1.0) + read,
+            Self::Described { read, offset } => (signal - offset).max(1.0) + read,
             Self::Scattered { curves, .. } => curves[channel].at(signal),
             Self::Unknown(_) => 0.0,
         }

@@ -20,13 +20,16 @@ pub(super) struct Rate {
     pub variance: f64,
     /// Signal of one reading.
     pub signal: f64,
+    pub exposure_s: f64,
 }
 
-/// All readings of a stop.
+/// All readings of a stop; of blank and dark, all of one exposure.
 #[derive(Debug, Clone)]
 pub(super) struct Stop {
     pub kind: Kind,
     pub entry: Option<u32>,
+    /// Its number in the log.
+    pub number: u32,
     /// The middle of its readings.
     pub time_s: f64,
     /// Channel by channel; `None` where every exposure saturated.
@@ -49,6 +52,7 @@ pub(super) struct Repeats {
 pub(super) struct Summary {
     kind: Kind,
     entry: Option<u32>,
+    number: u32,
     pub time_s: f64,
     /// From the first reading's beginning to the last one's end.
     pub seconds: f64,
@@ -63,26 +67,28 @@ impl Summary {
             repeats.map(|r| rate(&r, noise.variance(c, r.signal), instrument))
         };
         let rates = self.repeats.iter().enumerate().map(of).collect();
-        Stop { kind: self.kind, entry: self.entry, time_s: self.time_s, rates }
+        Stop { kind: self.kind, entry: self.entry, number: self.number, time_s: self.time_s, rates }
     }
 }
 
 /// Readings by stop, in order of time.
 pub(super) fn summaries(raw: &Raw, instrument: &Instrument) -> Vec<Summary> {
-    let mut first = 0;
-    let runs = raw.readings.chunk_by(|a, b| a.stop == b.stop);
-    runs.map(|run| {
-        let summary = combined(raw, instrument, first, run);
+    let (mut first, mut list) = (0, Vec::new());
+    for run in raw.readings.chunk_by(|a, b| a.stop == b.stop) {
+        let mut exposures: Vec<f64> = run.iter().map(|reading| reading.exposure_s).collect();
+        exposures.sort_by(|a, b| b.total_cmp(a));
+        exposures.dedup();
+        // What is subtracted is wanted in the exposure of what it is subtracted from.
+        let is_base = matches!(run[0].kind, Kind::Blank | Kind::Dark);
+        let parts = exposures.chunks(if is_base { 1 } else { exposures.len() });
+        list.extend(parts.map(|exposures| combined(raw, instrument, (first, run), exposures)));
         first += run.len();
-        summary
-    })
-    .collect()
+    }
+    list
 }
 
-fn combined(raw: &Raw, instrument: &Instrument, first: usize, run: &[Reading]) -> Summary {
-    let mut exposures: Vec<f64> = run.iter().map(|reading| reading.exposure_s).collect();
-    exposures.sort_by(|a, b| b.total_cmp(a));
-    exposures.dedup();
+/// Of the readings of a stop, from the `first` on, those of these exposures, descending.
+fn combined(raw: &Raw, instrument: &Instrument, (first, run): (usize, &[Reading]), exposures: &[f64]) -> Summary {
     let limit = limit(instrument);
     let channel = |c: usize| {
         // The longest exposure of which no reading saturates; a repeat that was not read counts for nothing.
@@ -99,6 +105,7 @@ fn combined(raw: &Raw, instrument: &Instrument, first: usize, run: &[Reading]) -
     Summary {
         kind: run[0].kind,
         entry: run[0].entry,
+        number: run[0].stop,
         time_s: 0.5 * (run[0].time_s + end_s),
         seconds: end_s - run[0].time_s,
         repeats: (0..raw.channels.len()).map(channel).collect(),
@@ -130,7 +137,12 @@ pub(in crate::gonio) fn limit(instrument: &Instrument) -> f64 {
 fn rate(of: &Repeats, noise: f64, instrument: &Instrument) -> Rate {
     let (count, exposure) = (of.count as f64, of.exposure_s);
     let variance = noise / count + rounding(noise, count, step(&instrument.detector));
-    Rate { mean: of.signal / exposure, variance: variance / (exposure * exposure), signal: of.signal }
+    Rate {
+        mean: of.signal / exposure,
+        variance: variance / (exposure * exposure),
+        signal: of.signal,
+        exposure_s: exposure,
+    }
 }
 
 /// Variance of the mean of `count` readings by their rounding to steps: of step²/12 the share that repeats have in common does not average out.

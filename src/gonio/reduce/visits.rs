@@ -1,13 +1,17 @@
 //! Readings of the reference, the blank and the dark, and what they say of the time between them.
 //!
-//! Each kind has its own times: a blank may be read more often than the reference, and where one can't be used the next one counts.
+//! Each kind has its own times: a blank may be read more often than the reference, and where one can't be used the next one counts. Of blank and dark those
+//! of the same exposure count, which have the same offset, and where there are none those of the longest, whose rates are known best.
 
 use super::ReduceError;
 use super::positions;
-use super::stops::Stop;
+use super::stops::{Rate, Stop};
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::reading::Kind;
+
+/// By which share exposures may differ that are called the same.
+const SAME: f64 = 1e-9;
 
 /// What was read once, of one channel.
 #[derive(Debug, Clone, Copy)]
@@ -18,7 +22,10 @@ struct Point {
     variance: f64,
     /// Signal of one reading.
     signal: f64,
+    exposure_s: f64,
     /// Number of the stop among those of its kind.
+    visit: usize,
+    /// Of the stop and exposure.
     number: usize,
 }
 
@@ -85,12 +92,32 @@ pub(super) struct At {
 
 /// All readings of base and reference, in order of time, channel by channel.
 pub(super) struct Visits {
-    base: Vec<Vec<Point>>,
+    base: Vec<Base>,
     reference: Vec<Vec<Point>>,
     /// Stops of the kind that has more.
     count: usize,
     /// Whether there is a base, and a reference.
     pub has: [bool; 2],
+}
+
+/// Readings of blank or dark in one channel, by exposure, the longest first.
+struct Base(Vec<Vec<Point>>);
+
+impl Base {
+    /// From readings in order of time.
+    fn new(all: Vec<Point>) -> Self {
+        let mut exposures: Vec<f64> = all.iter().map(|p| p.exposure_s).collect();
+        exposures.sort_by(|a, b| b.total_cmp(a));
+        exposures.dedup();
+        let of = |exposure: f64| all.iter().filter(|p| p.exposure_s == exposure).copied().collect();
+        Self(exposures.into_iter().map(of).collect())
+    }
+
+    /// Those that tell what a reading of this exposure has of them; none where there are none.
+    fn of(&self, exposure_s: f64) -> &[Point] {
+        let same = |list: &&Vec<Point>| (list[0].exposure_s / exposure_s - 1.0).abs() < SAME;
+        self.0.iter().find(same).or(self.0.first()).map_or(&[], Vec::as_slice)
+    }
 }
 
 impl Visits {
@@ -101,12 +128,14 @@ impl Visits {
     pub fn new(stops: &[Stop], raw: &Raw, instrument: &Instrument) -> Result<Self, ReduceError> {
         let width = raw.channels.len();
         let points = |kind: Kind, c: usize| -> Vec<Point> {
-            let of_kind = stops.iter().filter(|s| s.kind == kind).enumerate();
-            of_kind
-                .filter_map(|(number, stop)| {
-                    let rate = stop.rates[c]?;
-                    let (mean, variance, signal) = (rate.mean, rate.variance, rate.signal);
-                    Some(Point { time_s: stop.time_s, mean, variance, signal, number })
+            let of_kind: Vec<&Stop> = stops.iter().filter(|s| s.kind == kind).collect();
+            let visits = of_kind.chunk_by(|a, b| a.number == b.number).enumerate();
+            let numbered = visits.flat_map(|(visit, stops)| stops.iter().map(move |stop| (visit, stop)));
+            numbered
+                .enumerate()
+                .filter_map(|(number, (visit, stop))| {
+                    let Rate { mean, variance, signal, exposure_s } = stop.rates[c]?;
+                    Some(Point { time_s: stop.time_s, mean, variance, signal, exposure_s, visit, number })
                 })
                 .collect()
         };
@@ -116,7 +145,7 @@ impl Visits {
         let count = |kind: Kind| stops.iter().filter(|s| s.kind == kind).count();
         let counts = [Kind::Blank, Kind::Dark, Kind::Reference].map(count);
         let mut visits = Self {
-            base: (0..width).map(base).collect(),
+            base: (0..width).map(base).map(Base::new).collect(),
             reference: (0..width).map(|c| points(Kind::Reference, c)).collect(),
             count: counts.into_iter().max().unwrap_or(0),
             has: [counts[0] + counts[1] > 0, counts[2] > 0],
@@ -125,7 +154,7 @@ impl Visits {
         let jitter = positions::of_reference(instrument, raw.dimension);
         for (c, list) in visits.reference.iter_mut().enumerate() {
             for point in list {
-                let net = point.mean - interpolated(&visits.base[c], point.time_s).0;
+                let net = point.mean - interpolated(visits.base[c].of(point.exposure_s), point.time_s).0;
                 point.variance += (jitter * net).powi(2);
             }
         }
@@ -141,7 +170,7 @@ impl Visits {
                 return Err(ReduceError::UnreadableReference { channel: channel.clone() });
             }
             for point in &self.reference[c] {
-                let base = interpolated(&self.base[c], point.time_s).0;
+                let base = interpolated(self.base[c].of(point.exposure_s), point.time_s).0;
                 if point.mean <= base {
                     let (channel, time_s) = (channel.clone(), point.time_s);
                     return Err(ReduceError::DarkReference { channel, time_s, rate: point.mean, base });
@@ -156,9 +185,10 @@ impl Visits {
         self.count
     }
 
-    /// What they say of `time_s`: linear between two, the nearest before the first and after the last.
-    pub fn at(&self, time_s: f64, channel: usize) -> At {
-        let (base_list, reference_list) = (&self.base[channel], &self.reference[channel]);
+    /// What they say of `time_s` and of this exposure: linear between two, the nearest before the first and after the last.
+    pub fn at(&self, time_s: f64, channel: usize, exposure_s: f64) -> At {
+        let (bases, reference_list) = (&self.base[channel], &self.reference[channel]);
+        let base_list = bases.of(exposure_s);
         let (base, around, base_gap) = interpolated(base_list, time_s);
         let (mut base_parts, mut base_bent) = (Vec::with_capacity(4), 0.0);
         for (i, share) in around {
@@ -169,6 +199,7 @@ impl Visits {
         let (_, around, reference_gap) = interpolated(reference_list, time_s);
         for (i, share) in around {
             let point = reference_list[i];
+            let base_list = bases.of(point.exposure_s);
             let (under, of_base, _) = interpolated(base_list, point.time_s);
             reference += share * (point.mean - under);
             reference_bent += share * point.bent();
@@ -197,7 +228,7 @@ fn interpolated(list: &[Point], time_s: f64) -> (f64, Around, Gap) {
     let beyond_s = if a == b { (time_s - list[a].time_s).abs() } else { 0.0 };
     let value = (1.0 - late) * list[a].mean + late * list[b].mean;
     let around = Around(if a == b { [Some((a, 1.0)), None] } else { [Some((a, 1.0 - late)), Some((b, late))] });
-    (value, around, Gap { number: list[a].number, late, span_s, beyond_s })
+    (value, around, Gap { number: list[a].visit, late, span_s, beyond_s })
 }
 
 /// Places in a list with their shares: none, one or two.
@@ -228,7 +259,6 @@ fn add_part(parts: &mut Vec<BasePart>, list: &[Point], i: usize, (direct, throug
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gonio::reduce::stops::Rate;
     use crate::measurement::{Dimension, Directions, Weights};
 
     fn raw() -> Raw {
@@ -245,12 +275,8 @@ mod tests {
     }
 
     fn stop(kind: Kind, time_s: f64, mean: f64) -> Stop {
-        Stop {
-            kind,
-            entry: None,
-            time_s,
-            rates: vec![(!mean.is_nan()).then_some(Rate { mean, variance: 1.0, signal: mean })],
-        }
+        let rate = Rate { mean, variance: 1.0, signal: mean, exposure_s: 1.0 };
+        Stop { kind, entry: None, number: time_s as u32, time_s, rates: vec![(!mean.is_nan()).then_some(rate)] }
     }
 
     fn visits(list: &[(Kind, f64, f64)]) -> Result<Visits, ReduceError> {
@@ -275,7 +301,7 @@ mod tests {
             ],
             vec![(Reference, 0.0, 1000.0), (Reference, 9.0, f64::NAN), (Blank, 1.0, 10.0), (Blank, 10.0, f64::NAN)],
         ] {
-            let at = visits(&list).expect("readable").at(5.0, 0);
+            let at = visits(&list).expect("readable").at(5.0, 0, 1.0);
             assert!((at.base - 10.0).abs() < 1e-12 && (at.reference - 990.0).abs() < 1e-12, "{list:?}: {at:?}");
             let shares: f64 = at.base_parts.iter().map(|p| p.direct).sum();
             let through: f64 = at.base_parts.iter().map(|p| p.through_reference).sum();
@@ -289,7 +315,7 @@ mod tests {
     fn each_kind_is_interpolated_at_its_own_times() {
         use Kind::{Blank, Reference};
         let list = [(Reference, 0.0, 1000.0), (Blank, 2.0, 10.0), (Reference, 10.0, 1020.0), (Blank, 12.0, 12.0)];
-        let at = visits(&list).expect("readable").at(5.0, 0);
+        let at = visits(&list).expect("readable").at(5.0, 0, 1.0);
         // The blank at 5 s is 10.6; under the reference it was 10 (the nearest) and 11.6.
         assert!((at.base - 10.6).abs() < 1e-12 && (at.reference - (1010.0 - 10.8)).abs() < 1e-12, "{at:?}");
     }
@@ -301,7 +327,7 @@ mod tests {
         assert!(dark.to_string().contains("channel y: the reference reads 10 a second at 3 s"), "{dark}");
         let none = visits(&[(Reference, 3.0, f64::NAN), (Blank, 0.0, 10.0)]).err().expect("refused");
         assert!(none.to_string().contains("every reading of the reference is saturated or missing"), "{none}");
-        let at = visits(&[]).expect("nothing to refuse").at(1.0, 0);
+        let at = visits(&[]).expect("nothing to refuse").at(1.0, 0, 1.0);
         assert!(at.base == 0.0 && at.reference == 1.0 && at.base_parts.is_empty());
     }
 }
