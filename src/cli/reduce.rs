@@ -57,11 +57,13 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let given = args.instrument.as_deref().map(read_instrument).transpose()?;
     let instrument = given.or(told).unwrap_or_else(Instrument::noiseless);
     let name = Path::new(&input).file_stem().map_or("reduced".into(), |s| s.to_string_lossy());
-    let reduction = chain::reduced_until(&name, &raw, &instrument, ui.control().stop).map_err(|error| match error {
-        // Messages call the file as it was typed.
-        ChainError::Reduce { source, .. } => ChainError::Reduce { name: input.clone(), source },
-        other => other,
-    })?;
+    let mut reduction =
+        chain::reduced_until(&name, &raw, &instrument, ui.control().stop).map_err(|error| match error {
+            // Messages call the file as it was typed.
+            ChainError::Reduce { source, .. } => ChainError::Reduce { name: input.clone(), source },
+            other => other,
+        })?;
+    reduction.measurement.notes.extend(reduction.unstated.clone());
     let table = &reduction.measurement;
     for note in &table.notes {
         ui.warn(note);
@@ -75,10 +77,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         let lines: Vec<Line> = reduction.budget.lines.iter().map(unsigned).collect();
         json!({
             "out": args.out, "budget_file": args.budget, "readings": raw.readings.len(), "entries": table.len(), "valid": valid,
-            "components": table.common.len(), "budget": lines, "notes": table.notes,
+            "components": table.common.len(), "budget": lines, "origin": table.origin, "notes": table.notes,
         })
     };
-    let text = summary(&args.out, &raw, &reduction, valid);
+    let text = summary(&args.out, &reduction, valid);
     let outputs = [Some(args.out.as_path()), args.budget.as_deref()];
     finish(table, Some(&raw), &instrument, (text, object), &outputs, ui)
 }
@@ -89,12 +91,12 @@ fn unsigned(line: &Line) -> Line {
 }
 
 /// The budget as text.
-fn summary(out: &Path, raw: &Raw, reduction: &Reduction, valid: u64) -> String {
+fn summary(out: &Path, reduction: &Reduction, valid: u64) -> String {
     let table = &reduction.measurement;
     let mut text = format!(
-        "{}: {} of {} of directions, {}, {}",
+        "{}: {}; {} of directions, {}, {}",
         out.display(),
-        counted(raw.readings.len() as u64, "reading"),
+        table.origin,
         counted(table.len() as u64, "pair"),
         counted(valid, "valid value"),
         counted(table.common.len() as u64, "shared component")
@@ -113,6 +115,9 @@ fn summary(out: &Path, raw: &Raw, reduction: &Reduction, valid: u64) -> String {
         let sensitivity = line.sensitivity.map_or_else(String::new, |c| format!("{c:.2e}"));
         let _ =
             write!(text, "\n  {name}  {u:>15}  {sensitivity:>9}  {:>10.2e}  {:>6.3}%", line.rms, 100.0 * line.relative);
+    }
+    if table.sigma.is_none() {
+        text.push_str("\n  without noise, which is not known");
     }
     let _ = write!(text, "\n  one σ of a rate is in signals a second; median is of a reading's value");
     text

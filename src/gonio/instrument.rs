@@ -83,11 +83,9 @@ impl Instrument {
         }
         let none = || (self.readings == 0).then(|| "instrument.readings: expected at least 1, found 0".to_owned());
         let detector = &self.detector;
-        let counts =
-            detector.dark_per_s + detector.dark_drift_per_sqrt_hour + detector.offset + detector.full_well > 0.0;
+        let counts = detector.dark_per_s + detector.dark_drift_per_sqrt_hour + detector.offset > 0.0;
         let unit = (!self.is_noisy() && counts).then(|| {
-            "instrument.electrons: what counts electrons (dark, offset, full_well) needs a number above 0, found 0"
-                .into()
+            "instrument.electrons: what counts electrons (dark, offset) needs a number above 0, found 0".into()
         });
         let parts = [
             unit,
@@ -131,13 +129,12 @@ impl Instrument {
 
     /// A full well that noise and rounding fill would leave no reading that is safe from saturation.
     fn well_fault(&self) -> Option<String> {
-        let Detector { full_well, nonlinearity_u, offset, .. } = self.detector;
+        let Detector { full_well, offset, .. } = self.detector;
         (full_well > 0.0 && saturation_limit(self) <= offset).then(|| {
-            let margin = offset + full_well * (1.0 - 4.0 * nonlinearity_u) - saturation_limit(self);
             format!(
-                "instrument.detector.full_well: expected more than {}, or no reading is safe from saturation (offset, five times read_noise and a step of \
-                 the converter, over 1 − 4 nonlinearity_u), found {}",
-                shown(margin / (1.0 - 4.0 * nonlinearity_u)),
+                "instrument.detector.full_well: expected more than what offset, five times read_noise, a step of the converter and 4 nonlinearity_u of it take, \
+                 {} here, or no reading is safe from saturation; found {}",
+                shown(full_well - saturation_limit(self) + offset),
                 shown(full_well)
             )
         })
@@ -283,13 +280,13 @@ mod tests {
             ),
             (|i| i.source.beam_diameter_m = -1.0, "instrument.source.beam_diameter_m"),
             (
-                |i| i.detector.full_well = 1e-9,
-                "instrument.detector.full_well: expected 0 (never saturates) or a number from 1 to 1e18",
+                |i| i.detector.full_well = 1e-13,
+                "instrument.detector.full_well: expected 0 (never saturates) or a number from 1e-12 to 1e18",
             ),
-            // Five times a read noise of 10 over 1 − 4·0.1.
+            // Five times a read noise of 10, and 0.4 of 80.
             (
                 |i| (i.detector.full_well, i.detector.nonlinearity_u) = (80.0, 0.1),
-                "instrument.detector.full_well: expected more than 83.33333333333333, or no reading is safe from saturation",
+                "take, 82 here, or no reading is safe from saturation; found 80",
             ),
             (
                 |i| i.detector.nonlinearity_u = 0.3,

@@ -63,7 +63,7 @@ pub struct Detector {
     pub dark_drift_per_sqrt_hour: f64,
     /// What the electronics add to each reading, however long its exposure, electrons. Dark and blank are read in all exposures then.
     pub offset: f64,
-    /// Electrons at which a reading saturates; 0 is never.
+    /// Electrons at which a reading saturates, or the log's own unit where `electrons` is 0; 0 is never.
     pub full_well: f64,
     /// Bits of the converter, whose last step is full_well/(2^bits − 1); 0 is one without steps.
     pub bits: u32,
@@ -249,7 +249,7 @@ impl Detector {
             ("nonlinearity_u", self.nonlinearity_u, 0.2),
         ];
         let (far, field) = (("distance_m", self.distance_m), ("field_diameter_m", self.field_diameter_m));
-        let well = [("full_well", self.full_well, 1.0, 1e18)];
+        let well = [("full_well", self.full_well, 1e-12, 1e18)];
         let rising = self.exposures_s.windows(2).all(|e| e[0] < e[1]);
         let possible = self.exposures_s.iter().all(|e| (LEAST..=1e6).contains(e));
         check("detector", &numbers)

@@ -26,6 +26,8 @@ const INSTRUMENT: &str = "# instrument:";
 const DIMENSION: &str = "# dimension:";
 const NOTE: &str = "# note:";
 const SOLID_ANGLE: &str = "# weights: solid-angle";
+/// Largest magnitude of a signal, whose square is a number.
+const LARGEST_SIGNAL: f64 = 1e150;
 /// Largest magnitudes of the four angles, with room for rounding.
 const LARGEST: [f64; 4] = [180.0001, 360.0001, 180.0001, 360.0001];
 const FLAT_LARGEST: [f64; 2] = [90.0001, 90.0001];
@@ -312,7 +314,9 @@ impl Rows<'_> {
         for (name, column) in &self.columns.channels {
             let text = cell(*column);
             let signal = if text.is_empty() { Ok(f64::NAN) } else { text.parse() };
-            let signal = signal.map_err(|_| wrong(&format!("{SIGNAL}{name}"), "a number, or nothing", text))?;
+            let expected = "a number up to 1e150, inf where it is too large, or nothing";
+            let usable = |s: &f64| s.is_nan() || *s == f64::INFINITY || s.abs() <= LARGEST_SIGNAL;
+            let signal = signal.ok().filter(usable).ok_or_else(|| wrong(&format!("{SIGNAL}{name}"), expected, text))?;
             self.list.signal.push(signal);
         }
         let stop = stop_after(before, kind, entry);

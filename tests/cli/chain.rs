@@ -261,7 +261,7 @@ fn repeats_tell_the_noise_of_a_detector_that_nobody_described() {
         let ran = b.run(&["reduce", "raw.csv", "--instrument", "known.toml", "--out", "m.csv"]);
         assert_eq!(ran.code, Some(0), "{}", ran.err);
         assert_eq!(b.text("m.csv").contains("sigma_r"), stated);
-        let said = "σ is not stated: the detector's noise is not described";
+        let said = "σ is not stated, in any channel: the detector's noise is not described";
         assert_eq!(ran.err.contains(said), !stated, "{}", ran.err);
         assert_eq!(ran.text().contains("noise of the reading"), stated, "{}", ran.text());
     }

@@ -37,7 +37,8 @@ pub struct Line {
     pub u: Option<f64>,
     /// Its unit; rates are signals a second, walks their standard deviation after an hour. Empty where it is relative.
     pub unit: &'static str,
-    /// Sensitivity coefficient, `rms` over `u`: 1/sr by `unit`.
+    /// Sensitivity coefficient, 1/sr by `unit`: `rms` over `u` (type B), or root of the mean square of a reading's (type A, where σ and it differ from
+    /// reading to reading).
     pub sensitivity: Option<f64>,
     /// Standard uncertainty that it brings to a reading, root of the mean square over all valid readings, 1/sr.
     pub rms: f64,
@@ -60,7 +61,7 @@ impl Budget {
         let parts: Vec<_> = parts.into_iter().filter(|(_, v)| v.iter().any(|v| *v > 0.0)).collect();
         let total: Vec<f64> = (0..values.len()).map(|i| parts.iter().map(|(_, v)| v[i]).sum()).collect();
         let mut lines: Vec<Line> = parts.iter().map(|(input, v)| line(*input, v, values)).collect();
-        let all = Input { name: "all together", kind: Type::Both, u: None, unit: "" };
+        let all = Input { name: "all together", kind: Type::Both, u: None, unit: "", sensitivity: None };
         lines.push(line(all, &total, values));
         Self { lines, variances: parts.into_iter().map(|(_, v)| v).collect() }
     }
@@ -79,14 +80,16 @@ pub(super) struct Input {
     pub kind: Type,
     pub u: Option<f64>,
     pub unit: &'static str,
+    /// Where it is not one over `u`.
+    pub sensitivity: Option<f64>,
 }
 
-fn line(Input { name, kind, u, unit }: Input, variances: &[f64], values: &[f64]) -> Line {
+fn line(Input { name, kind, u, unit, sensitivity }: Input, variances: &[f64], values: &[f64]) -> Line {
     let valid = || values.iter().zip(variances).filter(|(v, _)| v.is_finite());
     let count = valid().count().max(1) as f64;
     let rms = (valid().map(|(_, u)| u).sum::<f64>() / count).sqrt();
     let mut shares: Vec<f64> = valid().filter(|(v, _)| **v != 0.0).map(|(v, u)| u.sqrt() / v.abs()).collect();
     shares.sort_by(f64::total_cmp);
     let relative = shares.get(shares.len() / 2).copied().unwrap_or(0.0);
-    Line { name, kind, u, unit, sensitivity: u.map(|u| rms / u), rms, relative }
+    Line { name, kind, u, unit, sensitivity: sensitivity.or(u.map(|u| rms / u)), rms, relative }
 }

@@ -10,6 +10,7 @@ mod budget;
 mod effect;
 mod noise;
 pub(super) mod positions;
+mod scatter;
 mod shared;
 mod spread;
 mod stops;
@@ -84,6 +85,8 @@ pub struct Reduction {
     pub measurement: Measurement,
     /// Where the uncertainty comes from.
     pub budget: Budget,
+    /// Why σ is not stated, where it is not.
+    pub unstated: Option<String>,
 }
 
 /// Reduces readings that an instrument of this description made. `model` is what is read, about (the material's mean over source
@@ -100,7 +103,7 @@ pub fn reduce(
 ) -> Result<Reduction, ReduceError> {
     let summaries = stops::summaries(raw, instrument);
     let noise = Noise::of(raw, &summaries, instrument);
-    let stops: Vec<Stop> = summaries.iter().map(|summary| summary.stop(&noise, instrument)).collect();
+    let stops: Vec<Stop> = summaries.iter().map(|summary| summary.stop(&noise)).collect();
     let has_reference = stops.iter().any(|s| s.kind == Kind::Reference);
     if !stops.iter().any(|s| s.kind == Kind::Sample) {
         return Err(ReduceError::NoSample);
@@ -110,10 +113,10 @@ pub fn reduce(
         return Err(if has_reference { ReduceError::NoCertificate } else { unread() });
     }
     let visits = Visits::new(&stops, raw, instrument)?;
-    let said = noise.note(raw, &summaries, instrument);
+    let notes = noise.notes(raw, &summaries, instrument);
     let work = Work { raw, instrument, noise, scale: Scale::new(instrument, raw.dimension), visits };
     let mut reduction = work.run(name, &stops, model);
-    reduction.measurement.notes.extend(said);
+    reduction.measurement.notes.extend(notes);
     Ok(reduction)
 }
 
@@ -230,7 +233,7 @@ impl Work<'_> {
             row,
             ..Measurement::new(name, self.raw.directions.clone(), self.raw.channels.clone(), table.values)
         };
-        Reduction { measurement, budget }
+        Reduction { measurement, budget, unstated: self.noise.unstated() }
     }
 
     /// Reduces one stop at a pair of directions.

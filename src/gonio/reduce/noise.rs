@@ -1,66 +1,59 @@
-//! The noise of readings: as the description says it, or as repeats scatter (GUM type A).
-//!
-//! A few repeats tell little of their own noise, all of a log together much: their variances follow a + b S + c S² of the signal S (electronics, shot
-//! noise, a source that flickers), a, b, c ≥ 0, most likely where each s² is a share of χ² with its own degrees of freedom (Janesick, *Photon
-//! Transfer*, 2007, has the same curve for detectors).
+//! The noise of readings, as the description says it; where it does not, as repeats scatter ([`super::scatter`]).
 
-use std::fmt::Write as _;
-
+use super::scatter::Scatter;
+use super::stops::{Repeats, Summary, before_rounding, rounding};
+use crate::control::counted;
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
-use crate::numeric::stats::{normal_quantile, student_quantile};
+use crate::gonio::reading::Kind;
 
-use super::stops::{Repeats, Summary};
-
-/// Degrees of freedom that a curve needs, and steps of the signal that repeats are put together in.
-const LEAST_FREEDOM: f64 = 12.0;
-const BINS: usize = 64;
-/// Rounds of the ascent to the most likely curve, each of 64 steps at most; they take a millisecond.
-const ROUNDS: usize = 4000;
-/// By how much repeats may scatter more than described, and of that scatter's own σ, before it is said.
+/// By how much repeats may scatter more or less than described, and of that scatter's own σ, before it is said.
 const TOLERATED: f64 = 1.2;
 const SURE: f64 = 5.0;
 
 /// What is known of the noise of one reading.
 pub(super) enum Noise {
     /// Shot noise of what is above the electronics' offset, at least one electron's worth, and the electronics' variance.
-    Described { read: f64, offset: f64 },
-    /// Curves of the channels, and the degrees of freedom behind the least sure one.
-    Scattered { curves: Vec<Curve>, freedom: f64 },
+    Described(Described),
+    /// As repeats scatter.
+    Scattered(Scatter),
     /// Nothing, and why.
     Unknown(String),
+}
+
+/// A detector that counts electrons.
+pub(super) struct Described {
+    read: f64,
+    offset: f64,
+    step: f64,
 }
 
 impl Noise {
     /// What description and repeats tell.
     pub fn of(raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Self {
         if instrument.is_noisy() {
-            return Self::Described { read: instrument.read_noise.powi(2), offset: instrument.detector.offset };
+            let step = step(&instrument.detector);
+            let (read, offset) = (instrument.read_noise.powi(2), instrument.detector.offset);
+            return Self::Described(Described { read, offset, step });
         }
-        let (mut curves, mut least) = (Vec::new(), f64::INFINITY);
-        for (c, channel) in raw.channels.iter().enumerate() {
-            let points = binned(summaries.iter().filter_map(|s| s.repeats[c].as_ref()));
-            let freedom = points.iter().map(|p| p.freedom).fold(0.0, |a, b| a + b);
-            if freedom < LEAST_FREEDOM {
-                return Self::Unknown(format!(
-                    "expected {LEAST_FREEDOM} repeats at least beyond the first of their stop, found {freedom} in channel {channel}"
-                ));
-            }
-            let Some(curve) = Curve::through(&points, freedom) else {
-                return Self::Unknown(format!("repeats of channel {channel} are equal to their last digit"));
-            };
-            curves.push(curve);
-            least = least.min(freedom);
-        }
-        Self::Scattered { curves, freedom: least }
+        Scatter::of(raw, summaries, instrument).map_or_else(Self::Unknown, Self::Scattered)
     }
 
-    /// Variance of one reading; 0 where nothing is known.
-    pub fn variance(&self, channel: usize, signal: f64) -> f64 {
+    /// Variance of the mean of repeats, in signals².
+    pub fn variance(&self, channel: usize, of: &Repeats) -> f64 {
+        let count = of.count as f64;
         match self {
-            Self::Described { read, offset } => (signal - offset).max(1.0) + read,
-            Self::Scattered { curves, .. } => curves[channel].at(signal),
+            Self::Described(known) => {
+                let noise = (of.signal - known.offset).max(1.0) + known.read;
+                let (common, own) = rounding(noise, known.step);
+                common + (noise + own) / count
+            }
+            Self::Scattered(scatter) => {
+                let (shown, step) = (scatter.variance(channel, of), scatter.step(channel));
+                // What does not come and go with repeats does not show in them.
+                rounding(before_rounding(shown, step), step).0 + shown / count
+            }
             Self::Unknown(_) => 0.0,
         }
     }
@@ -70,145 +63,102 @@ impl Noise {
         !matches!(self, Self::Unknown(_))
     }
 
-    /// Where it comes from, for the measurement's origin; nothing where it was described.
+    /// Where it comes from; nothing where it was described.
     pub fn said(&self) -> String {
         match self {
-            Self::Scattered { freedom, .. } => {
-                format!(", their noise from the scatter of repeats ({freedom} degrees of freedom)")
+            Self::Scattered(scatter) => {
+                format!(", their noise from the scatter of repeats ({} degrees of freedom)", scatter.freedom().round())
             }
             _ => String::new(),
         }
     }
 
-    /// What a user must know of it.
-    pub fn note(&self, raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Option<String> {
+    /// What a user must know of it, beside why it is not known.
+    pub fn notes(&self, raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Vec<String> {
         match self {
-            Self::Described { .. } => self.excess(raw, summaries, instrument),
-            Self::Scattered { .. } => None,
-            Self::Unknown(why) => Some(format!(
-                "σ is not stated: the detector's noise is not described (instrument.electrons = 0) and repeats don't tell it: {why}"
-            )),
+            Self::Described(known) => known.contradictions(raw, summaries, instrument),
+            Self::Scattered(scatter) => scatter.notes(raw, summaries),
+            Self::Unknown(_) => Vec::new(),
         }
     }
 
-    /// Says so where repeats scatter clearly more than described.
-    fn excess(&self, raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Option<String> {
-        let (mut sum, mut freedom, mut worst) = (0.0, 0.0, (0.0, 0, 0.0));
-        for summary in summaries {
-            for (c, of) in summary.repeats.iter().enumerate().filter_map(|(c, r)| Some((c, r.as_ref()?))) {
-                let own = of.count as f64 - 1.0;
-                let ratio = of.scatter / self.expected(c, of, summary.seconds, instrument);
-                sum += own * ratio;
-                freedom += own;
-                if own > 0.0 && ratio > worst.0 {
-                    worst = (ratio, c, summary.time_s);
-                }
-            }
-        }
-        let ratio = sum / freedom;
-        let is_sure = ratio > TOLERATED * TOLERATED && ratio - 1.0 > SURE * (2.0 / freedom).sqrt();
-        is_sure.then(|| {
-            let mut text = format!(
-                "repeats scatter {:.1} times as far as the description says (electrons, read_noise, drift): σ is too small by that where noise leads",
-                ratio.sqrt()
-            );
-            // Writing to a String can't fail.
-            let _ = write!(text, "; most at {} s, channel {}, {:.1} times", worst.2, raw.channels[worst.1], worst.0.sqrt());
-            text
-        })
-    }
-
-    /// Variance that repeats of a stop of so many seconds should scatter by: noise, rounding, and at most what source and dark walk meanwhile.
-    fn expected(&self, channel: usize, of: &Repeats, seconds: f64, instrument: &Instrument) -> f64 {
-        let hours = seconds / 3600.0;
-        let walk = (of.signal * instrument.source.drift_per_sqrt_hour).powi(2)
-            + (of.exposure_s * instrument.detector.dark_drift_per_sqrt_hour).powi(2);
-        self.variance(channel, of.signal) + step(&instrument.detector).powi(2) / 12.0 + walk * hours
+    /// Why σ is not stated.
+    pub fn unstated(&self) -> Option<String> {
+        let Self::Unknown(why) = self else { return None };
+        Some(format!(
+            "σ is not stated, in any channel: the detector's noise is not described (instrument.electrons = 0), and repeats don't tell it: {why}"
+        ))
     }
 }
 
-/// Repeats about one signal.
-#[derive(Debug, Clone, Copy)]
-struct Point {
-    signal: f64,
+/// How repeats of one kind and channel scatter beside what is described.
+#[derive(Default)]
+struct Tally {
+    /// Sum of degrees of freedom times s²/expected, its variance, and degrees of freedom.
+    sum: f64,
     variance: f64,
     freedom: f64,
+    /// Where the ratio is largest.
+    worst: (f64, f64),
 }
 
-/// Repeats put together by their signal, all steps about as sure.
-fn binned<'a>(all: impl Iterator<Item = &'a Repeats>) -> Vec<Point> {
-    let mut points: Vec<Point> = all
-        .filter(|r| r.count > 1)
-        .map(|r| Point { signal: r.signal.max(0.0), variance: r.scatter, freedom: r.count as f64 - 1.0 })
-        .collect();
-    points.sort_by(|a, b| a.signal.total_cmp(&b.signal));
-    let most = points.iter().map(|p| p.freedom).sum::<f64>() / BINS as f64;
-    let mut bins: Vec<Point> = Vec::new();
-    for point in points {
-        match bins.last_mut() {
-            Some(bin) if bin.freedom + point.freedom <= most => {
-                let freedom = bin.freedom + point.freedom;
-                let mean = |a: f64, b: f64| (bin.freedom * a + point.freedom * b) / freedom;
-                let (signal, variance) = (mean(bin.signal, point.signal), mean(bin.variance, point.variance));
-                *bin = Point { signal, variance, freedom };
-            }
-            _ => bins.push(point),
-        }
-    }
-    bins
-}
-
-/// Variance of a reading over its signal.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Curve {
-    /// a, b and c, of the signal over `scale`.
-    parts: [f64; 3],
-    scale: f64,
-}
-
-impl Curve {
-    /// The most likely one, by steps that never make it less so (Dikmen, Yang & Oja 2015, β = 0: θ ← θ √(Σ ν x s²/m² ⁄ Σ ν x/m)). Its variances are as much
-    /// larger as Student's quantile of a third of the degrees of freedom is than the normal one: intervals of 1.96 σ then hold 95 %.
-    fn through(points: &[Point], freedom: f64) -> Option<Self> {
-        let mean = points.iter().map(|p| p.freedom * p.variance).sum::<f64>() / freedom;
-        if mean <= 0.0 {
-            return None;
-        }
-        let scale = Some(points.iter().map(|p| p.signal).fold(0.0, f64::max)).filter(|s| *s > 0.0).unwrap_or(1.0);
-        let mut curve = Self { parts: [mean / 3.0; 3], scale };
-        for _ in 0..ROUNDS {
-            let before = curve.parts;
-            let (mut up, mut down) = ([0.0; 3], [0.0; 3]);
-            for point in points {
-                let model = curve.at(point.signal);
-                for (k, x) in curve.terms(point.signal).into_iter().enumerate() {
-                    up[k] += point.freedom * x * (point.variance / model) / model;
-                    down[k] += point.freedom * x / model;
+impl Described {
+    /// Says of kinds and channels whose repeats scatter clearly more, or less, than described.
+    fn contradictions(&self, raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Vec<String> {
+        let mut found: [Option<(f64, String)>; 2] = [None, None];
+        for kind in Kind::ALL {
+            for (c, channel) in raw.channels.iter().enumerate() {
+                let tally = self.tally(summaries.iter().filter(|s| s.kind == kind), c, instrument);
+                let ratio = (tally.sum / tally.freedom).sqrt();
+                let is_sure = (tally.sum - tally.freedom).abs() > SURE * tally.variance.sqrt();
+                let much = if ratio > 1.0 { ratio } else { ratio.recip() };
+                if !is_sure || much <= TOLERATED {
+                    continue;
+                }
+                let of = format!("repeats of the {}, channel {channel}, scatter", kind.name());
+                let text = if ratio > 1.0 {
+                    let (at_s, most) = (tally.worst.1, tally.worst.0.sqrt());
+                    format!(
+                        "{of} {ratio:.1} times as far as the description says (electrons, read_noise, drift): σ is too small where noise leads; most at \
+                         {at_s} s, {most:.1} times"
+                    )
+                } else {
+                    format!(
+                        "{of} {ratio:.1e} times as far as the description says (electrons, read_noise, drift): σ is too large; signals are taken for electrons \
+                         (electrons = 0 takes σ from the repeats, in any unit)"
+                    )
+                };
+                let place = &mut found[usize::from(ratio < 1.0)];
+                if place.as_ref().is_none_or(|(most, _)| much > *most) {
+                    *place = Some((much, text));
                 }
             }
-            for k in 0..3 {
-                if down[k] > 0.0 {
-                    curve.parts[k] *= (up[k] / down[k]).sqrt();
-                }
+        }
+        found.into_iter().flatten().map(|(_, text)| text).collect()
+    }
+
+    fn tally<'a>(&self, of: impl Iterator<Item = &'a Summary>, c: usize, instrument: &Instrument) -> Tally {
+        let mut tally = Tally::default();
+        for (at_s, repeats) in of.filter_map(|s| Some((s.time_s, s.repeats[c].as_ref()?))) {
+            let (own, shot) = (repeats.count as f64 - 1.0, (repeats.signal - self.offset).max(0.0));
+            let expected = shot + self.read + self.step * self.step / 12.0 + repeats.walked(instrument);
+            if own == 0.0 || expected == 0.0 {
+                continue;
             }
-            let largest = curve.parts.iter().fold(0.0, |a, b| f64::max(a, *b));
-            if curve.parts.iter().zip(before).all(|(a, b)| (a - b).abs() <= 1e-9 * largest) {
-                break;
+            let ratio = repeats.scatter / expected;
+            tally.sum += own * ratio;
+            // Of s², by the fourth cumulant of electrons that come by chance.
+            tally.variance += own * own * (2.0 / own + shot / (expected * expected * repeats.count as f64));
+            tally.freedom += own;
+            if ratio > tally.worst.0 {
+                tally.worst = (ratio, at_s);
             }
         }
-        let wide = (student_quantile(0.975, freedom / 3.0) / normal_quantile(0.975)).powi(2);
-        curve.parts.iter_mut().for_each(|p| *p *= wide);
-        Some(curve)
+        tally
     }
+}
 
-    fn terms(&self, signal: f64) -> [f64; 3] {
-        let x = signal.max(0.0) / self.scale;
-        [1.0, x, x * x]
-    }
-
-    fn at(&self, signal: f64) -> f64 {
-        // A part that fell to nothing leaves no variance at all at the signal 0.
-        let of: f64 = self.terms(signal).into_iter().zip(self.parts).map(|(x, part)| x * part).sum();
-        of.max(f64::MIN_POSITIVE)
-    }
+/// "3 readings", for messages.
+pub(super) fn readings(count: usize) -> String {
+    counted(count as u64, "reading")
 }

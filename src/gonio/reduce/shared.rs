@@ -30,8 +30,8 @@ struct Family {
     name: &'static str,
     kind: Type,
     unit: &'static str,
-    /// Sum of squares of its input's σ over what was read, and how often.
-    read: (f64, f64),
+    /// Sums of squares of its input's σ and of the sensitivity to it over what was read, and how often.
+    read: [f64; 3],
     /// Variance that is not in any component, by reading; empty for none.
     own: Vec<f64>,
     /// Its part of components and variances that belong to several, by reading; empty for none.
@@ -39,14 +39,15 @@ struct Family {
 }
 
 impl Family {
-    fn was_read(&mut self, variance: f64) {
-        self.read.0 += variance;
-        self.read.1 += 1.0;
+    fn was_read(&mut self, sigma: f64, sensitivity: f64) {
+        let more = [sigma * sigma, sensitivity * sensitivity, 1.0];
+        self.read.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
     }
 
-    /// σ of its readings, root of the mean square.
-    fn rms(&self) -> f64 {
-        (self.read.0 / self.read.1).sqrt()
+    /// σ of its readings and the sensitivity to them, roots of the mean squares.
+    fn rms(&self) -> [f64; 2] {
+        let [sigma, sensitivity, count] = self.read;
+        [sigma, sensitivity].map(|sum| (sum / count).sqrt())
     }
 }
 
@@ -105,7 +106,7 @@ impl<'a> Shared<'a> {
                 name,
                 kind,
                 unit,
-                read: (0.0, 0.0),
+                read: [0.0; 3],
                 own: Vec::new(),
                 attributed: Vec::new(),
             })
@@ -199,15 +200,17 @@ impl<'a> Shared<'a> {
     pub fn reading(&mut self, place: usize, channel: usize, of: &Reduced) {
         let Reduced { value, conversion, rate, ref at, .. } = *of;
         self.add_own(READING, place, conversion * conversion * rate.variance);
-        self.families[READING].was_read(rate.variance);
+        self.families[READING].was_read(rate.variance.sqrt(), conversion);
         for part in &at.reference_parts {
-            self.families[REFERENCE].was_read(part.sigma * part.sigma);
-            let u = -value / at.reference * part.share * part.sigma;
+            let sensitivity = -value / at.reference * part.share;
+            self.families[REFERENCE].was_read(part.sigma, sensitivity);
+            let u = sensitivity * part.sigma;
             self.add_grouped(REFERENCE, part.number, channel, place, u);
         }
         for part in &at.base_parts {
-            self.families[BASE].was_read(part.sigma * part.sigma);
-            let u = (value / at.reference * part.through_reference - conversion * part.direct) * part.sigma;
+            let sensitivity = value / at.reference * part.through_reference - conversion * part.direct;
+            self.families[BASE].was_read(part.sigma, sensitivity);
+            let u = sensitivity * part.sigma;
             self.add_grouped(BASE, part.number, channel, place, u);
         }
         self.add(CERTIFICATE, (0, 0), place, value * self.instrument.reference.reflectance_u);
@@ -294,16 +297,18 @@ impl<'a> Shared<'a> {
         }
         let input = |k: usize| {
             let Family { name, kind, unit, .. } = self.families[k];
-            Input { name, kind, u: Some(self.uncertainty(k)), unit }
+            let [sigma, sensitivity] = self.families[k].rms();
+            let (u, sensitivity) = self.described(k).map_or((sigma, Some(sensitivity)), |u| (u, None));
+            Input { name, kind, u: Some(u), unit, sensitivity }
         };
         let lines = variances.into_iter().enumerate().map(|(k, variance)| (input(k), variance));
         Budget::new(lines.collect(), &table.values)
     }
 
-    /// Standard uncertainty of what a family's readings depend on.
-    fn uncertainty(&self, family: usize) -> f64 {
+    /// Standard uncertainty of what a family's readings depend on, where it is described.
+    fn described(&self, family: usize) -> Option<f64> {
         let Instrument { source, sample, detector, reference, axes, .. } = self.instrument;
-        match family {
+        Some(match family {
             CERTIFICATE => reference.reflectance_u,
             DRIFT => source.drift_per_sqrt_hour,
             DARK => detector.dark_drift_per_sqrt_hour,
@@ -312,8 +317,8 @@ impl<'a> Shared<'a> {
             TILT => sample.tilt_u_deg,
             HEIGHT => sample.height_u_m,
             JITTER => axes.jitter_deg,
-            _ => self.families[family].rms(),
-        }
+            _ => return None,
+        })
     }
 
     /// The components' planes.

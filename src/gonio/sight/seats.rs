@@ -9,7 +9,7 @@ use crate::brdf::Place;
 use crate::geometry::mirror;
 use crate::gonio::spot::Spot;
 
-/// Most points that are kept: 48 MB.
+/// Most points that are kept: some 100 MB, with what finds them. Nothing makes room: what comes later is made anew.
 const MOST: usize = 2_000_000;
 
 /// From one point: α, cosθi/cosθo, and what it counts.
