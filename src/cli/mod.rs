@@ -90,7 +90,7 @@ enum Command {
     Compare(compare::Args),
     /// Put a run on one HTML page: measurement, fits, pictures, numbers
     Report(report::Args),
-    /// Draw a figure as SVG or PNG: lobes, slices, residuals, coverage
+    /// Draw a figure as SVG or PNG: lobes, slices, residuals, coverage, curves of a tradeoff
     Plot(plot::Args),
     /// Convert between measurement formats, or sample a fit onto a grid
     Convert(convert::Args),

@@ -52,6 +52,16 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
         assert!(!b.bytes(&format!("t/{name}")).is_empty(), "{name}");
     }
     assert_eq!(timeless(&b.json_file("t/tradeoff.json")), timeless(&found));
+    let again = b.json(&["plot", "tradeoff", "t/tradeoff.json", "--only", "parameters-part", "--out", "p.svg"]);
+    assert!(b.text("p.svg") == b.text("t/parameters-part.svg"), "the file holds all that the plot shows");
+    let drawn = &again["plots"][0]["curves"][0];
+    let want: Vec<f64> = errors(&found, "lambert+phong", "parameters").into_iter().filter(|e| *e > 0.0).collect();
+    assert_eq!((&drawn["name"], &drawn["y"]), (&"lambert+phong".into(), &want.into()));
+    let all = b.json(&["plot", "tradeoff", "t/tradeoff.json", "--out", "all.png"]);
+    let names = all["plots"].as_array().expect("plots").iter().map(|p| format!("{}.svg", p["name"].as_str().unwrap()));
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    assert_eq!(names, b.list("t").into_iter().filter(|n| n.ends_with(".svg")).collect::<Vec<_>>());
     let csv = b.text("t/tradeoff.csv");
     let rows = csv.lines().filter(|l| !l.starts_with('#')).count();
     assert_eq!(rows, 1 + 5, "{csv}");

@@ -14,7 +14,7 @@ pub(in crate::report) use demo::{DEMO_INSTRUMENT, find as known_instrument};
 pub use error::ReportError;
 pub use table::Table;
 
-use super::views::Predicted;
+use super::views::{Predicted, Sweep};
 use crate::brdf::Material;
 use crate::image::Image;
 use crate::measurement::{Measurement, ReadOptions};
@@ -107,7 +107,7 @@ pub struct Run {
     /// What `goniofit effects --json` found, where its output lies in the folder as `effects.json`.
     pub effects: Option<Value>,
     /// What `goniofit tradeoff` measured: every `tradeoff.json` in the folder, or in a folder within it.
-    pub sweeps: Vec<Value>,
+    pub sweeps: Vec<Sweep>,
 }
 
 /// What `numbers.json` does not say.
@@ -149,19 +149,20 @@ impl Run {
     fn add_extras(&mut self) {
         let effects = self.folder.join(EFFECTS);
         if effects.is_file() {
-            self.effects = self.extra(&effects, "effects");
+            let known = |value: Value| if value["effects"].is_array() { Ok(value) } else { Err("no list `effects`") };
+            self.effects = self.extra(&effects, known);
         }
         for path in sweeps(&self.folder) {
-            let sweep = self.extra(&path, "curves");
+            let sweep = self.extra(&path, serde_json::from_value::<Sweep>);
             self.sweeps.extend(sweep);
         }
     }
 
-    /// An object with a list of this name.
-    fn extra(&mut self, path: &Path, list: &str) -> Option<Value> {
-        let reason = match json(path) {
-            Ok(value) if value[list].is_array() => return Some(value),
-            Ok(_) => format!("{}: expected an object with the list `{list}`, found none", path.display()),
+    /// What `understood` makes of a file's JSON.
+    fn extra<T, E: std::fmt::Display>(&mut self, path: &Path, understood: impl Fn(Value) -> Result<T, E>) -> Option<T> {
+        let reason = match json(path).map(understood) {
+            Ok(Ok(found)) => return Some(found),
+            Ok(Err(error)) => format!("{}: expected what goniofit wrote there, found {error}", path.display()),
             Err(error) => error.to_string(),
         };
         self.notes.push(left_out(&reason));
