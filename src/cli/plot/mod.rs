@@ -79,9 +79,9 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     };
     output.check(&inputs, ui)?;
     let (figure, mut object) = match &args.kind {
-        Kind::Polar(a) => kinds::curves(a, true)?,
-        Kind::Slice(a) => kinds::curves(a, false)?,
-        Kind::Residuals(a) => kinds::residuals(a)?,
+        Kind::Polar(a) => kinds::curves(a, true, ui)?,
+        Kind::Slice(a) => kinds::curves(a, false, ui)?,
+        Kind::Residuals(a) => kinds::residuals(a, ui)?,
         Kind::Coverage(a) => kinds::coverage(&a.measurement, &a.output.reading)?,
         Kind::Tradeoff(a) => tradeoff::curves(a)?,
     };

@@ -55,15 +55,14 @@ fn commands(run: &Run) -> Vec<Command> {
         push("slices", &[&["goniofit", "plot", "slice", path][..], &files, &["--out", "slices.svg"]].concat());
         for fit in &run.fits {
             let mut words = vec!["goniofit", "plot", "residuals", path, &fit.file];
-            let seen = fit.material().fit.as_ref().is_some_and(|record| record.through.is_some());
-            if let Some(instrument) = run.instrument.as_deref().filter(|_| seen) {
+            if let Some(instrument) = &fit.through {
                 words.extend(["--through", instrument]);
             }
             words.extend(["--out", "residuals.svg"]);
             push("residual maps", &words);
         }
     }
-    if let Some((first, others)) = run.pictures.split_first() {
+    if let Some((first, others)) = run.pictures.split_first().filter(|(first, _)| first.label == run.reference) {
         for other in others {
             let [a, b] = [&other.file, &first.file].map(|f| run.folder.join(f).display().to_string());
             push("numbers of the pictures", &["goniofit", "compare", &a, &b]);

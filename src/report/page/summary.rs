@@ -83,7 +83,7 @@ fn verdict(run: &Run) -> Vec<String> {
             )
         });
     }
-    let reference = run.pictures.first().map_or("reference", |p| p.label.as_str());
+    let reference = &run.reference;
     if let Some(s) = fit.image.as_ref().map(|image| &image["significance"]).filter(|s| s.is_object()) {
         let (differing, pixels) = (s["pixels_differing"].as_u64().unwrap_or(0), s["pixels"].as_u64().unwrap_or(0));
         said.push(match differing {

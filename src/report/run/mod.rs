@@ -3,6 +3,7 @@
 mod demo;
 mod error;
 mod loose;
+mod sight;
 mod table;
 mod validated;
 
@@ -10,8 +11,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-pub(in crate::report) use demo::{DEMO_INSTRUMENT, find as known_instrument};
 pub use error::ReportError;
+pub use sight::fitted_through;
+pub(in crate::report) use sight::known_instrument;
 pub use table::Table;
 
 use super::views::{Predicted, Sweep};
@@ -37,8 +39,10 @@ pub struct RunFit {
     pub label: String,
     /// Its file, as one would type it.
     pub file: String,
-    /// The material, and what it is seen through.
+    /// The material, and what it is seen through beside readings.
     pub predicted: Predicted,
+    /// The name of that instrument.
+    pub through: Option<String>,
     /// How its picture differs from the reference's, as `numbers.json` has it; none where there is no such picture.
     pub image: Option<Value>,
 }
@@ -88,8 +92,10 @@ pub struct Run {
     pub truth: Option<Predicted>,
     /// The fits.
     pub fits: Vec<RunFit>,
-    /// Pictures, the one that others are compared with first.
+    /// Pictures, the one that others are compared with first, if it can be read.
     pub pictures: Vec<Picture>,
+    /// What that one shows.
+    pub reference: String,
     /// Exposure of the previews, stops.
     pub exposure: Option<f64>,
     /// Time of each stage, s.
@@ -176,9 +182,10 @@ impl Run {
         measurement: Measurement,
         file: &str,
         material: &Material,
-        through: Through,
+        through: Option<(String, Through)>,
         made: Made,
     ) -> Self {
+        let (name, sight) = through.map_or((None, None), |(name, sight)| (Some(name), sight));
         let label = material.model();
         let table = Table::new(path, measurement);
         Self {
@@ -186,10 +193,21 @@ impl Run {
             folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
             title: table.measurement.name.clone(),
             table: Ok(table),
-            fits: vec![RunFit { label, file: file.into(), predicted: Predicted::new(material, through), image: None }],
+            fits: vec![RunFit {
+                label,
+                file: file.into(),
+                predicted: Predicted::new(material, sight),
+                through: name,
+                image: None,
+            }],
             made,
             ..Self::empty()
         }
+    }
+
+    /// Where files that the run names may lie.
+    pub(in crate::report) fn folders(&self) -> Vec<&Path> {
+        self.made.folder.as_deref().into_iter().chain([Path::new(""), &self.folder]).collect()
     }
 
     pub(in crate::report) fn empty() -> Self {
@@ -201,6 +219,7 @@ impl Run {
             truth: None,
             fits: Vec::new(),
             pictures: Vec::new(),
+            reference: String::new(),
             exposure: None,
             times: Vec::new(),
             instrument: None,
@@ -254,14 +273,44 @@ fn found(name: &str, made: &Made, folder: &Path) -> PathBuf {
     places.into_iter().find(|p| p.is_file()).unwrap_or(path)
 }
 
-/// A picture of the folder, if it is there.
-fn picture(folder: &Path, file: &str, label: &str) -> Result<Option<Picture>, ReportError> {
+/// A picture of the folder, if it is there; one that can't be read becomes a note.
+fn picture(folder: &Path, file: &str, label: &str, notes: &mut Vec<String>) -> Option<Picture> {
     let path = folder.join(file);
     if !path.is_file() {
-        return Ok(None);
+        return None;
     }
-    let image = crate::image::read_exr(&path).map_err(crate::chain::ChainError::from)?;
-    Ok(Some(Picture { label: label.into(), file: file.into(), image }))
+    match crate::image::read_exr(&path) {
+        Ok(image) => Some(Picture { label: label.into(), file: file.into(), image }),
+        Err(error) => {
+            notes.push(format!(
+                "The picture of {label} is left out: {error}. Make it again by the command that wrote it."
+            ));
+            None
+        }
+    }
+}
+
+/// A fit as it is compared with the run's readings: through the instrument that it was made through, where that is known; else a note says that it is not.
+fn compared(
+    material: &Material,
+    (label, file): (&str, String),
+    otherwise: Option<&str>,
+    made: &Made,
+    notes: &mut Vec<String>,
+) -> RunFit {
+    let beside = Path::new(&file).parent().unwrap_or(Path::new(""));
+    let folders: Vec<&Path> = made.folder.as_deref().into_iter().chain([Path::new(""), beside]).collect();
+    let (through, sight) = match fitted_through(material, otherwise, &folders) {
+        Ok(seen) => seen.map_or((None, None), |(name, sight)| (Some(name), sight)),
+        Err(unknown) => {
+            notes.push(format!(
+                "{label} was fitted through {unknown}. Here it is drawn as the surface, while the table is what the instrument saw: about sharp \
+                 highlights part of their difference is the instrument's own blur."
+            ));
+            (None, None)
+        }
+    };
+    RunFit { label: label.into(), file, predicted: Predicted::new(material, sight), through, image: None }
 }
 
 /// Where sweeps lie, by name.
