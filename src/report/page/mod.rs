@@ -6,6 +6,7 @@ mod effects;
 mod fits;
 mod lobes;
 mod measured;
+mod peaks;
 mod pictures;
 mod pixels;
 mod reproduce;
@@ -128,7 +129,7 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
     if !has_pictures {
         let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
         let mut words = vec!["goniofit", "validate", &table];
-        words.extend(run.fits.iter().map(|f| f.file.as_str()));
+        words.extend(run.fits.iter().map(|f| reproduce::as_typed(run, &f.file)));
         words.extend(["--out", "DIR", "--report"]);
         let command = reproduce::typed(&words);
         missing.pictures = format!("There are no pictures here. Render table and fits under the same light: {command}");
