@@ -1,6 +1,6 @@
 //! What accuracy took in time, as far as the run's files have it.
 
-use crate::report::plot::{LogLog, Marks, Point, Series, minus};
+use crate::report::plot::{Heading, LogLog, Marks, Point, Series, minus};
 use crate::report::run::Run;
 use crate::report::views::{self, SweepSlope};
 use crate::report::words::{count, number, percent, time as told};
@@ -78,7 +78,7 @@ fn fits(run: &Run) -> Option<String> {
     };
     let series: Vec<Series> = run.fits.iter().zip(colors).filter_map(of).collect();
     let chart = LogLog {
-        title: "Time and rmse of the fits".into(),
+        heading: Heading { title: "Time and rmse of the fits".into(), ..Heading::default() },
         x_label: "time of the fit [s]".into(),
         y_label: "rmse".into(),
         series,

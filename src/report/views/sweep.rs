@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::report::plot::{Figure, LogLog, Marks, Point, Series, Slope};
+use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope};
 
 /// What `goniofit tradeoff` measured of a stage, as `tradeoff.json` has it; what is neither drawn nor listed is not read.
 #[derive(Debug, Clone, Deserialize)]
@@ -183,7 +183,13 @@ impl Sweep {
             return None;
         }
         let title = format!("{} {}: {y} against {x}", self.stage, self.subject);
-        let chart = LogLog { title, x_label: x.into(), y_label: y.into(), series, slopes, titled: false };
+        let chart = LogLog {
+            heading: Heading { title, ..Heading::default() },
+            x_label: x.into(),
+            y_label: y.into(),
+            series,
+            slopes,
+        };
         let shows = format!("{y} against {}", x.trim_end_matches(" [s]"));
         Some(SweepPlot { name, shows, figure: chart.figure(), series: chart.series })
     }
