@@ -2,6 +2,7 @@
 
 mod demo;
 mod error;
+mod files;
 mod loose;
 mod sight;
 mod table;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 pub use error::ReportError;
+use files::{found, json, picture, sweeps};
 pub use sight::fitted_through;
 pub(in crate::report) use sight::known_instrument;
 pub use table::Table;
@@ -140,7 +142,7 @@ impl Run {
             if numbers.get("truth").is_some() {
                 demo::read(folder, &numbers, options)?
             } else if numbers.get("reference").is_some() {
-                validated::read(folder, &numbers, options)?
+                validated::read(folder, &numbers, options)
             } else {
                 return Err(ReportError::Numbers { path });
             }
@@ -245,12 +247,6 @@ fn left_out(reason: &str) -> String {
 /// What lobes are seen through.
 pub type Through = Option<std::sync::Arc<dyn crate::brdf::Sight>>;
 
-/// The JSON in a file.
-fn json(path: &Path) -> Result<Value, ReportError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ReportError::Io { path: path.into(), source })?;
-    serde_json::from_str(&text).map_err(|source| ReportError::Json { path: path.into(), source })
-}
-
 impl Made {
     /// As `run` in `numbers.json` says it.
     #[must_use]
@@ -260,32 +256,6 @@ impl Made {
             program: run["program"].as_str().map(str::to_owned),
             command: words.filter_map(|w| w.as_str().map(str::to_owned)).collect(),
             folder: run["folder"].as_str().map(PathBuf::from),
-        }
-    }
-}
-
-/// A file that was named in another folder than this: as it is, from the run's folder, beside the results.
-fn found(name: &str, made: &Made, folder: &Path) -> PathBuf {
-    let path = PathBuf::from(name);
-    let there = made.folder.iter().map(|f| f.join(&path));
-    let beside = path.file_name().map(|f| folder.join(f));
-    let places = there.chain([path.clone()]).chain(beside);
-    places.into_iter().find(|p| p.is_file()).unwrap_or(path)
-}
-
-/// A picture of the folder, if it is there; one that can't be read becomes a note.
-fn picture(folder: &Path, file: &str, label: &str, notes: &mut Vec<String>) -> Option<Picture> {
-    let path = folder.join(file);
-    if !path.is_file() {
-        return None;
-    }
-    match crate::image::read_exr(&path) {
-        Ok(image) => Some(Picture { label: label.into(), file: file.into(), image }),
-        Err(error) => {
-            notes.push(format!(
-                "The picture of {label} is left out: {error}. Make it again by the command that wrote it."
-            ));
-            None
         }
     }
 }
@@ -313,34 +283,8 @@ fn compared(
     RunFit { label: label.into(), file, predicted: Predicted::new(material, sight), through, image: None }
 }
 
-/// Where sweeps lie, by name.
-fn sweeps(folder: &Path) -> Vec<PathBuf> {
-    // A folder that does not tell what is in it may hold the run all the same.
-    let entries = std::fs::read_dir(folder).into_iter().flatten();
-    let within = entries.filter_map(Result::ok).map(|e| e.path().join(SWEEP));
-    let mut found: Vec<PathBuf> = within.chain([folder.join(SWEEP)]).filter(|p| p.is_file()).collect();
-    found.sort();
-    found
-}
-
 /// The note on a run that was ended early.
 fn stopped(numbers: &Value) -> Option<String> {
     let is_stopped = numbers["stopped"] == true;
     is_stopped.then(|| "The run was stopped early: pictures are missing or have fewer samples than asked for.".into())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn files_are_found_where_the_run_was_made_or_beside_its_results() {
-        let (there, results) = (tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder"));
-        let made = Made { folder: Some(there.path().into()), ..Made::default() };
-        assert_eq!(found("lab.csv", &made, results.path()), PathBuf::from("lab.csv"), "nowhere: as it was typed");
-        std::fs::write(results.path().join("lab.csv"), "x").expect("writes");
-        assert_eq!(found("data/lab.csv", &made, results.path()), results.path().join("lab.csv"));
-        std::fs::write(there.path().join("lab.csv"), "x").expect("writes");
-        assert_eq!(found("lab.csv", &made, results.path()), there.path().join("lab.csv"));
-    }
 }

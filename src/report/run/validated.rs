@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{Kind, Made, ReportError, Run, RunFit, RunOptions, Table, compared, found, picture, stopped};
+use super::{Kind, Made, Run, RunFit, RunOptions, Table, compared, found, picture, stopped};
 use crate::chain::load_material;
 
-pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Result<Run, ReportError> {
+pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Run {
     let made = Made::of(&numbers["run"]);
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let typed = text(&numbers["measurement"]);
@@ -45,7 +45,7 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Resu
     let table = Table::read(&path, &options.reading);
     let stem = || PathBuf::from(&typed).file_stem().map(|s| s.to_string_lossy().into_owned());
     let title = table.as_ref().ok().map(|t| t.measurement.name.clone()).or_else(stem);
-    Ok(Run {
+    Run {
         kind: Kind::Validate,
         folder: folder.into(),
         title: title.unwrap_or_else(|| "validation".into()),
@@ -59,7 +59,7 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Resu
         made,
         notes,
         ..Run::empty()
-    })
+    }
 }
 
 /// A fit's model; its file besides where another has the same.

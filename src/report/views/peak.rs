@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     fn curve(step: f64, of: impl Fn(f64) -> f64) -> Curve {
-        let theta: Vec<f64> = (0..).map(|k| -90.0 + step * f64::from(k)).take_while(|t| *t <= 90.0).collect();
+        let theta: Vec<f64> = (0..=(180.0 / step) as u32).map(|k| -90.0 + step * f64::from(k)).collect();
         let values = vec![theta.iter().map(|t| of(*t)).collect()];
         Curve { name: "c".into(), readings: false, color: 1, theta_o_deg: theta, values, sigma: None }
     }
