@@ -1,6 +1,6 @@
 //! What each effect of the instrument costs: `cargo bench --bench effects` prints readings per second, ideal, with each effect alone, and with all. What
 //! `benches/zero-cost.sh` counts instructions of: `-- --once by-hand` reads f·cosθo without any pass, `ideal` an instrument without parts, `without NAME`
-//! one with every part but that of an effect, `left-out NAME` one with all parts and the effect left out by name. Both make the same readings, those
+//! one with every part but that of an effect, `left-out NAME` one with all parts and the effect, and what else its part brings, left out by name. Both make the same readings, those
 //! of blank and dark among them, and neither has parts that ask for the effect's own.
 #![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
 
@@ -100,6 +100,11 @@ fn built_on(name: &str) -> &'static [&'static str] {
     if name == "saturation" { &["nonlinearity", "quantisation"] } else { &[] }
 }
 
+/// What a part brings besides its own effect: a beam with a size and a distance are the spot's extent together.
+fn brings(name: &str) -> &'static [&'static str] {
+    if ["sample height", "footprint"].contains(&name) { &["spot extent"] } else { &[] }
+}
+
 fn once(args: &[String]) {
     let named = || PARTS.iter().find(|(name, _)| Some(*name) == args.get(1).map(String::as_str)).expect("an effect").0;
     let all = || {
@@ -114,7 +119,7 @@ fn once(args: &[String]) {
             let without = with(PARTS.iter().filter(|p| p.0 != name && !built_on(name).contains(&p.0)));
             read(&without, &all(), COARSE_DEG, &["shot noise"])
         }
-        Some("left-out") => read(&all(), &all(), COARSE_DEG, &["shot noise", named()]),
+        Some("left-out") => read(&all(), &all(), COARSE_DEG, &[&["shot noise", named()], brings(named())].concat()),
         other => panic!("expected by-hand, ideal, without NAME or left-out NAME, found {other:?}"),
     };
     println!("{:?}", readings.0);
