@@ -1,7 +1,7 @@
 //! What each effect of the instrument costs: `cargo bench --bench effects` prints readings per second, ideal, with each effect alone, and with all. What
 //! `benches/zero-cost.sh` counts instructions of: `-- --once by-hand` reads f·cosθo without any pass, `ideal` an instrument without parts, `without NAME`
-//! one with every part but that of an effect, `left-out NAME` one with all parts and the effect, and what else its part brings, left out by name. Both make the same readings, those
-//! of blank and dark among them, and neither has parts that ask for the effect's own.
+//! one with every part but that of an effect, `left-out NAME` one with all parts, the effect and what else its part brings left out by name. Both make
+//! the same readings, those of blank and dark among them, and neither has parts that ask for the effect's own.
 #![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
 
 use std::hint::black_box;
