@@ -36,5 +36,6 @@ pub(super) fn peaks(slices: &[Slice], channel: usize) -> Peaks {
 
 fn said(peak: Peak) -> (String, String) {
     let width = peak.width_deg.map_or_else(String::new, |width| format!(", {}° wide", digits(width, 3)));
-    (number(peak.value), format!("at {}°{width}", digits(peak.theta_o_deg, 3)))
+    let place = peak.theta_o_deg.map_or_else(|| "level".into(), |theta| format!("at {}°", digits(theta, 3)));
+    (number(peak.value), place + &width)
 }

@@ -2,13 +2,16 @@
 
 use super::Curve;
 
+/// Values that differ by less than this share are one: rounding.
+const LEVEL: f64 = 1e-9;
+
 /// The largest value of a curve and the width about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
     /// The value, in the curve's unit.
     pub value: f64,
-    /// Its angle, degrees.
-    pub theta_o_deg: f64,
+    /// Its angle, degrees; none where the curve is level.
+    pub theta_o_deg: Option<f64>,
     /// From half the value on one side to half on the other, degrees; none where a side does not fall that far.
     pub width_deg: Option<f64>,
 }
@@ -31,7 +34,9 @@ pub fn peak(curve: &Curve, channel: usize) -> Option<Peak> {
     let right = (at..values.len() - 1).map(|k| (k, k + 1)).find(ends).and_then(fallen);
     let left = (1..=at).rev().map(|k| (k, k - 1)).find(ends).and_then(fallen);
     let width_deg = right.zip(left).map(|(r, l)| r - l).filter(|_| value > 0.0);
-    Some(Peak { value, theta_o_deg: curve.theta_o_deg[at], width_deg })
+    let least = values.iter().copied().fold(value, f64::min); // which passes over NaN
+    let is_level = value - least <= LEVEL * value.abs();
+    Some(Peak { value, theta_o_deg: (!is_level).then(|| curve.theta_o_deg[at]), width_deg })
 }
 
 #[cfg(test)]
@@ -50,7 +55,7 @@ mod tests {
             let lobe = |t: f64| (t - 20.0).to_radians().cos().max(0.0).powf(n);
             let found = peak(&curve(0.25, lobe), 0).expect("a peak");
             let want = 2.0 * 0.5f64.powf(1.0 / n).acos().to_degrees();
-            assert_eq!((found.theta_o_deg, found.value), (20.0, 1.0));
+            assert_eq!((found.theta_o_deg, found.value), (Some(20.0), 1.0));
             let width = found.width_deg.expect("falls on both sides");
             // Lines between points a quarter of a degree apart, over a peak of this width.
             assert!((width - want).abs() < 0.01, "n {n}: {width} vs {want}");
@@ -63,6 +68,8 @@ mod tests {
         assert_eq!(width(|t| 1.0 + 0.1 * t.to_radians().cos()), None);
         assert_eq!(width(|t| (-(t - 80.0).abs() / 20.0).exp()), None, "cut off by the horizon");
         assert_eq!(width(|t| if (5.0..6.0).contains(&t) { f64::NAN } else { (-t.abs() / 10.0).exp() }), None);
+        let level = peak(&curve(1.0, |t| if t > 80.0 { f64::NAN } else { 0.1 }), 0).expect("values");
+        assert_eq!((level.theta_o_deg, level.width_deg), (None, None));
         assert!(peak(&curve(1.0, |_| f64::NAN), 0).is_none() && peak(&curve(1.0, |_| 1.0), 1).is_none());
     }
 }

@@ -206,7 +206,8 @@ pub fn polar_figure(slice: &Slice, channel: usize, name: &str, scale: Scale, uni
 fn heading(slice: &Slice, (channel, name): (usize, &str), unit: &str, drawn: bool) -> Heading {
     let largest = |curve: &Curve| {
         let Peak { value, theta_o_deg, .. } = peak(curve, channel)?;
-        Some(format!("{}: largest {} {unit} at {}°", curve.name, number(value), number(theta_o_deg)))
+        let place = theta_o_deg.map_or_else(String::new, |theta| format!(" at {}°", number(theta)));
+        Some(format!("{}: largest {} {unit}{place}", curve.name, number(value)))
     };
     Heading {
         title: format!("θi = {}°, channel {name}", number(slice.incidence_deg)),
