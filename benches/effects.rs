@@ -55,7 +55,7 @@ fn material() -> Material {
 
 /// Steps of scans, degrees; of the instructions that all parts together take a part is enough.
 const STEP_DEG: f64 = 5.0;
-const COARSE_DEG: f64 = 10.0;
+const COARSE_DEG: f64 = 20.0;
 
 /// Readings made, and the seconds that they took: those that an instrument makes itself, or those that `like` would make.
 fn read(instrument: &Instrument, like: &Instrument, step_deg: f64, left_out: &[&str]) -> (usize, f64) {

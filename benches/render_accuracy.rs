@@ -1,5 +1,5 @@
 //! What `target_error` and a deadline promise, in 100 trials each, and what the plan of effects is worth: `cargo bench --bench render_accuracy` prints
-//! Markdown tables; `-- --trials 10` takes fewer trials.
+//! Markdown tables; `-- --trials 10` takes fewer trials, `-- --plans` and `-- --promises` print one part.
 #![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
 
 use std::path::Path;
@@ -70,7 +70,7 @@ fn deadlines(trials: u64) {
 
 /// 256 samples a pixel by the plan of the scene, without closed forms, and by the full integrator: time, and the error that the picture states.
 fn plans() {
-    println!("\n| scene | plan | time | relative error |\n|---|---|---|---|");
+    println!("| scene | plan | time | relative error |\n|---|---|---|---|");
     for name in ["sphere", "furnace", "sphere-on-plane", "cornell", "preview", "mesh-env"] {
         let scene = built(name);
         let derived = Plan::of(&scene);
@@ -89,8 +89,13 @@ fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let place = arguments.iter().position(|a| a == "--trials");
     let trials = place.and_then(|i| arguments.get(i + 1)?.parse().ok()).unwrap_or(100);
-    plans();
-    println!();
-    targets(trials);
-    deadlines(trials);
+    let asked = |part: &str| arguments.iter().any(|a| a == part);
+    if !asked("--promises") {
+        plans();
+        println!();
+    }
+    if !asked("--plans") {
+        targets(trials);
+        deadlines(trials);
+    }
 }

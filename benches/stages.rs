@@ -1,4 +1,5 @@
-//! What each stage costs: `cargo bench`. Inputs are made here; nothing is read but what was written.
+//! What each stage costs: `cargo bench`. Inputs are made here; nothing is read but what was written. `benches/performance.py stages` runs it and makes a
+//! table of it.
 #![allow(clippy::expect_used, missing_docs)] // a bench may fail loudly; criterion's macros make undocumented items
 
 use std::hint::black_box;
@@ -6,14 +7,17 @@ use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use goniofit::brdf::{Brdf, LobeKind, Material};
-use goniofit::chain::{Source, Stage, measure, picture};
+use goniofit::chain::{DemoOptions, Source, Stage, demo, measure, measure_raw, picture, reduced};
 use goniofit::control::Control;
 use goniofit::fit::{FitOptions, fit};
 use goniofit::geometry::direction;
-use goniofit::gonio::{Instrument, Scan};
+use goniofit::gonio::{Instrument, Preset, Scan};
+use goniofit::image::{compare, read_exr};
 use goniofit::measurement::interpolate::TableBrdf;
 use goniofit::measurement::{Format, Measurement, ReadOptions, formats};
 use goniofit::render::Options;
+use goniofit::report::page;
+use goniofit::report::run::{Run, RunOptions};
 
 fn truth(exponent: f64) -> Source {
     let channels = ["r", "g", "b"].map(str::to_owned).to_vec();
@@ -74,6 +78,21 @@ fn instrument(c: &mut Criterion) {
     group.finish();
 }
 
+/// An instrument with faults: its raw readings, and the way back.
+fn faults(c: &mut Criterion) {
+    let instrument = Preset::find("commercial").expect("built in").spec().expect("valid").instrument;
+    let scan = Scan::InPlane { step_deg: 5.0 };
+    let readings = || measure_raw("m", &truth(90.0), &instrument, &scan, 1, Control::silent()).expect("readings");
+    let raw = readings().as_written();
+    let mut group = c.benchmark_group("faults");
+    group.sample_size(10);
+    group.bench_function("simulate `commercial`, all effects, in the plane of incidence", |b| b.iter(readings));
+    group.bench_function("reduce those readings", |b| {
+        b.iter(|| reduced("m", black_box(&raw), &instrument).expect("a reduction"));
+    });
+    group.finish();
+}
+
 fn tables(c: &mut Criterion) {
     let table = merl_table(200.0);
     let mut group = c.benchmark_group("table as BRDF");
@@ -103,5 +122,22 @@ fn pictures(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(stages, files, fits, instrument, tables, pictures);
+/// What a run leaves, compared and put on a page.
+fn results(c: &mut Criterion) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let options = DemoOptions { size: 256, samples: 16, ..DemoOptions::default() };
+    demo(folder.path(), &options, Control::silent()).expect("a run");
+    let [a, b] = ["lambert.exr", "truth.exr"].map(|name| read_exr(&folder.path().join(name)).expect("a picture"));
+    let mut group = c.benchmark_group("results");
+    group.sample_size(10);
+    group.bench_function("compare two pictures of 256², all metrics", |bench| {
+        bench.iter(|| compare(black_box(&a), black_box(&b)).expect("numbers"));
+    });
+    group.bench_function("report: read the demo's folder, write the page", |bench| {
+        bench.iter(|| page(&Run::read(folder.path(), &RunOptions::default()).expect("a run")).expect("a page"));
+    });
+    group.finish();
+}
+
+criterion_group!(stages, files, fits, instrument, faults, tables, pictures, results);
 criterion_main!(stages);

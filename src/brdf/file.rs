@@ -46,6 +46,9 @@ pub struct FitRecord {
     /// The instrument through which the lobes were fitted, if any: what it averages over.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub through: Option<String>,
+    /// That instrument's name, or its file, as it was typed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instrument: Option<String>,
     /// The robust loss's s, in the residual's unit: one, or one a channel where channels were fitted apart.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub robust_scale: Vec<f64>,

@@ -79,7 +79,8 @@ pub struct Demo {
 const MATERIAL: &str = "glossy-paint";
 const SCENE: &str = "sphere-on-plane";
 const MODELS: [&str; 2] = ["lambert", "lambert+phong"];
-const NOISY_DETECTOR: &str = "shot and read noise";
+/// What the demo calls its instrument where none was named.
+pub const NOISY_DETECTOR: &str = "shot and read noise";
 
 /// A fit that is to be made: what it is called, its model, what it sees through.
 struct Wanted {
@@ -144,7 +145,10 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
     let mut fitted = Vec::new();
     for Wanted { label, model, through } in wanted(&instrument) {
         let spec = model.parse().map_err(|e: crate::brdf::SpecError| ChainError::Mismatch(e.to_string()))?;
-        let material = fit(&table, &FitOptions { through, ..FitOptions::new(spec) })?.material;
+        let mut material = fit(&table, &FitOptions { through, ..FitOptions::new(spec) })?.material;
+        if let Some(record) = material.fit.as_mut().filter(|record| record.through.is_some()) {
+            record.instrument = Some(name.clone());
+        }
         write_material(&folder.join(format!("{label}.json")), &material)?;
         lap(&format!("fit {label}"));
         fitted.push((label, material));

@@ -18,7 +18,7 @@ mod scene_effects;
 mod source;
 mod surrogate;
 
-pub use demo::{Demo, DemoFit, DemoOptions, demo};
+pub use demo::{Demo, DemoFit, DemoOptions, NOISY_DETECTOR, demo};
 pub use error::ChainError;
 pub use gallery::{Gallery, Shown, write_gallery};
 pub use library::{BuiltInMaterial, MATERIALS};

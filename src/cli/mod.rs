@@ -29,6 +29,7 @@ mod simulation;
 mod tradeoff;
 mod ui;
 mod validate;
+mod welcome;
 
 use std::process::ExitCode;
 
@@ -44,7 +45,7 @@ const EXAMPLES: &str = "Examples:
 
 /// Measured-BRDF fitting: simulate a gonioreflectometer, fit analytic models, render and compare.
 #[derive(Debug, Parser)]
-#[command(name = "goniofit", version, after_help = EXAMPLES, max_term_width = 100, arg_required_else_help = true)]
+#[command(name = "goniofit", version, after_help = EXAMPLES, max_term_width = 100)]
 struct Cli {
     #[command(flatten)]
     global: Global,
@@ -89,7 +90,7 @@ enum Command {
     Compare(compare::Args),
     /// Put a run on one HTML page: measurement, fits, pictures, numbers
     Report(report::Args),
-    /// Draw a figure as SVG or PNG: lobes, slices, residuals, coverage
+    /// Draw a figure as SVG or PNG: lobes, slices, residuals, coverage, curves of a tradeoff
     Plot(plot::Args),
     /// Convert between measurement formats, or sample a fit onto a grid
     Convert(convert::Args),
@@ -110,6 +111,10 @@ enum Command {
 /// Runs the command that the process was started with.
 #[must_use]
 pub fn main() -> ExitCode {
+    if std::env::args_os().len() < 2 {
+        Ui::new(false, false).result(welcome::TEXT, &serde_json::Value::Null);
+        return ExitCode::from(u8::from(ui::lost_output()));
+    }
     let wants_json = std::env::args_os().any(|a| a == "--json");
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,

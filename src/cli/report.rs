@@ -45,12 +45,15 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     keeps_inputs("--out", &out, table.into_iter().chain(run.fits.iter().map(|fit| Path::new(&fit.file))))?;
     check_folder(&out)?;
     let written = write(&run, &out)?;
+    for note in &run.notes {
+        ui.warn(note);
+    }
     for missing in &written.missing {
         ui.note(&format!("not in the report: {missing}"));
     }
     let size = written.html.len();
     let object = json!({
-        "out": out, "bytes": size, "missing": written.missing, "warnings": written.warnings,
+        "out": out, "bytes": size, "missing": written.missing, "warnings": written.warnings, "notes": run.notes,
         "fits": run.fits.iter().map(|f| &f.label).collect::<Vec<_>>(), "pictures": run.pictures.len(),
     });
     let said = format!("{} ({:.1} MB): open it in any browser", out.display(), size as f64 / 1e6);

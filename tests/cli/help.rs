@@ -71,6 +71,30 @@ fn the_help_of_every_command_has_an_example_that_its_parser_accepts() {
 }
 
 #[test]
+fn alone_it_says_what_to_start_with() {
+    let b = Bench::new();
+    let ran = b.ok(&[]);
+    assert!(ran.err.is_empty(), "{}", ran.err);
+    let text = ran.text();
+    assert!(text.lines().all(|l| l.chars().count() <= 80) && text.lines().count() <= 24, "fits a terminal: {text}");
+    assert!(text.contains("goniofit --help"), "{text}");
+    let (known, mut named) = (commands(&b), 0);
+    for line in text.lines().filter_map(|l| l.trim().strip_prefix("goniofit ").filter(|_| l.starts_with("   "))) {
+        let args: Vec<&str> = line.split_whitespace().collect();
+        assert!(known.iter().any(|name| name == args[0]), "{line}");
+        // With `--help` nothing runs, but what stands before it is read.
+        b.ok(&[&args[..], &["--help"]].concat());
+        named += 1;
+    }
+    assert!((5..=6).contains(&named), "{text}");
+    // Options without a command are a mistake.
+    for args in [&["--quiet"][..], &["--threads", "2"], &["--json"]] {
+        assert_eq!(b.run(args).code, Some(2), "{args:?}");
+    }
+    assert!(b.run(&["--json"]).json()["error"].is_string());
+}
+
+#[test]
 fn every_command_knows_json_quiet_and_threads() {
     let b = Bench::new();
     for name in commands(&b) {

@@ -81,6 +81,13 @@ fn what_cannot_be_drawn_is_said() {
     let b = Bench::new();
     b.fitted("p.csv", "p.json");
     b.write("flat.csv", std::fs::read(fixture("measurements/in-plane-flat-world.csv")).expect("reads"));
+    let setting = |s: f64| format!(r#"{{"seconds": {{"value": {s}}}, "errors": [{{"value": {s}, "low": {s}}}]}}"#);
+    let sweep = |settings: &str| {
+        let curve = format!(r#"{{"name": "c", "main": "error", "knob": "effects", "points": [{settings}]}}"#);
+        format!(r#"{{"stage": "fit", "subject": "s", "measures": [{{"name": "error"}}], "curves": [{curve}]}}"#)
+    };
+    b.write("sweep.json", sweep(&setting(1.0)));
+    b.write("pair.json", sweep(&[setting(1.0), setting(2.0)].join(", ")));
     for (args, expected) in [
         (&["slice", "p.csv", "--out", "f.pdf"][..], "--out: expected a name that ends in .svg or .png"),
         (&["slice", "p.csv", "--channel", "x", "--out", "f.svg"], "--channel: expected one of r, g, b, found x"),
@@ -90,6 +97,11 @@ fn what_cannot_be_drawn_is_said() {
         (&["coverage", "flat.csv", "--out", "f.svg"], "expected a measurement of space"),
         (&["coverage", "p.csv", "--out", "no/f.svg"], "there is no such folder"),
         (&["coverage", "none.csv", "--out", "f.svg"], "none.csv"),
+        (&["tradeoff", "none.json", "--out", "f.svg"], "none.json"),
+        (&["tradeoff", "p.json", "--out", "f.svg"], "expected the tradeoff.json"),
+        (&["tradeoff", "p.csv", "--out", "f.svg"], "expected the tradeoff.json"),
+        (&["tradeoff", "sweep.json", "--out", "f.svg"], "expected a curve of two settings or more"),
+        (&["tradeoff", "pair.json", "--only", "x", "--out", "f.svg"], "--only: expected any of error-time, found x"),
     ] {
         let ran = b.run(&[&["plot"][..], args].concat());
         assert_eq!(ran.code, Some(2), "{args:?}: {}", ran.err);

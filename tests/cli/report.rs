@@ -1,6 +1,6 @@
 //! `report`, and `--report`: one page, whole, from whatever is there.
 
-use crate::bench::{Bench, csv};
+use crate::bench::{Bench, csv, number};
 
 /// A page's visible data are where they belong: nothing from a file or name became markup.
 fn assert_whole(page: &str) {
@@ -94,6 +94,89 @@ fn names_from_files_stay_text() {
     assert_eq!(page.matches("</script>").count(), 2, "the page's own two scripts end, and nothing else does");
     b.ok(&["plot", "slice", "n.csv", "n.json", "--out", "n.svg"]);
     assert!(!b.text("n.svg").contains("<img src=x"));
+}
+
+/// A write that was cut short, or another file under a picture's name, costs that picture and no more.
+#[test]
+fn a_picture_that_can_t_be_read_is_left_out_and_the_rest_is_there() {
+    let b = Bench::new();
+    b.ok(&["demo", "--size", "24", "--samples", "4", "--out", "d"]);
+    let whole = b.bytes("d/truth.exr");
+    for (name, bytes) in [
+        ("lambert", whole[..whole.len() / 2].to_vec()),
+        ("lambert", Vec::new()),
+        ("lambert", whole[..200].to_vec()),
+        ("truth", b"not a picture".to_vec()),
+    ] {
+        let file = format!("d/{name}.exr");
+        let kept = b.bytes(&file);
+        b.write(&file, bytes);
+        let ran = b.ok(&["report", "d", "--json"]);
+        let (said, page) = (ran.json(), b.text("d/report.html"));
+        assert_eq!(said["pictures"], 2, "{name}");
+        let note = said["notes"][0].as_str().unwrap();
+        assert!(note.contains(&format!("The picture of {name} is left out: {file}")), "{note}");
+        assert!(ran.err.contains(&format!("warning: {note}")) && page.contains(&format!("{name} is left out")));
+        // The numbers are those of the run, against what they were measured against.
+        assert!(page.contains("picture against that of the truth") && page.contains("lambert+phong.exr"), "{name}");
+        b.write(&file, kept);
+    }
+    assert_eq!(b.json(&["report", "d"])["notes"].as_array().unwrap().len(), 0);
+}
+
+/// The table is what the instrument saw, so a fit through it is compared as the instrument would see that, wherever both stand together.
+#[test]
+fn a_fit_through_an_instrument_is_compared_through_it_or_said_to_be_not() {
+    let b = Bench::new();
+    b.write("wide.toml", "version = 1\n[instrument]\nelectrons = 1e6\n[instrument.detector]\naperture_deg = 4.0\n");
+    let simulate = ["simulate", "--material", "glossy-paint", "--instrument", "wide.toml", "--scan", "hemisphere:15"];
+    b.ok(&[&simulate[..], &["--out", "m.csv"]].concat());
+    std::fs::create_dir(b.path("fits")).unwrap();
+    b.ok(&["fit", "m.csv", "--through", "wide.toml", "--out", "fits/m.json", "--report"]);
+    let rmse = number(&b.json_file("fits/m.json")["fit"]["rmse"]);
+    let drawn = || number(&b.json(&["plot", "residuals", "m.csv", "fits/m.json", "--out", "r.svg"])["rmse"]);
+    let peak = || {
+        let found = b.json(&["plot", "slice", "m.csv", "fits/m.json", "--incidence", "30", "--out", "s.svg"]);
+        let fit = &found["slices"][0]["curves"][1];
+        // Where the aperture reaches below the horizon a fit has no value.
+        let values = fit["value"].as_array().unwrap().iter().filter_map(serde_json::Value::as_f64);
+        values.fold(0.0, f64::max)
+    };
+    let through = (drawn(), peak());
+    assert!((through.0 / rmse - 1.0).abs() < 1e-6, "{} vs {rmse}", through.0);
+    b.ok(&["validate", "m.csv", "fits/m.json", "--size", "16", "--samples", "4", "--out", "v"]);
+    let report = |folder: &str| {
+        let said = b.json(&["report", folder, "--measurement", "m.csv"]);
+        (said["notes"].as_array().unwrap().clone(), b.text(&format!("{folder}/report.html")))
+    };
+    let sees = "Like the readings, lambert+phong as wide.toml sees it.";
+    for page in [b.text("fits/m.html"), report("v").1] {
+        assert!(page.contains(sees) && !page.contains("own rmse is"), "the residuals are those of the fit");
+    }
+    let (notes, page) = report("v");
+    assert!(notes.is_empty() && page.contains("its picture is of the surface"), "{notes:?}");
+    assert!(page.contains("fits/m.json --through wide.toml --out residuals.svg"));
+    assert!(report("fits").1.contains("Like the readings, m as wide.toml sees it."));
+    // Without the instrument's file, or with another under its name, it is said.
+    for (content, says) in [(None, "not at hand"), (Some("aperture_deg = 2.0"), "now it has an aperture of 2.000°")] {
+        std::fs::remove_file(b.path("wide.toml")).ok();
+        if let Some(aperture) = content {
+            b.write(
+                "wide.toml",
+                format!("version = 1\n[instrument]\nelectrons = 1e6\n[instrument.detector]\n{aperture}\n"),
+            );
+        }
+        for folder in ["v", "fits"] {
+            let (notes, page) = report(folder);
+            let note = notes[0].as_str().unwrap();
+            assert!(note.contains(says) && note.contains("drawn as the surface"), "{note}");
+            assert!(page.contains("drawn as the surface") && !page.contains("sees it."), "{folder}");
+            assert!(page.contains("own rmse is"), "{folder}: residuals of another prediction than the fit's");
+        }
+        let ran = b.ok(&["plot", "residuals", "m.csv", "fits/m.json", "--out", "r.svg"]);
+        assert!(ran.err.contains("warning: fits/m.json: fitted through") && ran.err.contains(says), "{}", ran.err);
+        assert!(drawn() > 5.0 * through.0 && peak() > 1.01 * through.1, "{} {} vs {through:?}", drawn(), peak());
+    }
 }
 
 #[test]

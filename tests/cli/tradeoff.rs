@@ -26,6 +26,11 @@ fn slope(found: &Value, curve_name: &str, name: &str) -> f64 {
     number(&slopes.iter().find(|s| s["measure"] == name).expect("a slope")["slope"]["value"])
 }
 
+/// The words of a command line.
+fn typed(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
 /// What does not depend on the clock.
 fn timeless(found: &Value) -> Vec<Value> {
     let curves = found["curves"].as_array().expect("curves");
@@ -37,8 +42,7 @@ fn timeless(found: &Value) -> Vec<Value> {
 fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     let b = Bench::new();
     b.ok(&["simulate", "--material", "glossy-paint", "--seed", "3", "--out", "paint.csv"]);
-    let args =
-        ["tradeoff", "fit", "paint.csv", "--parts", "1,10,20,40", "--targets", "1%", "--trials", "24", "--out", "t"];
+    let args = typed("tradeoff fit paint.csv --parts 1,10,20,40 --targets 1% --trials 24 --out t");
     let found = b.json(&args);
     let excess = errors(&found, "lambert+phong", "excess");
     assert_eq!(excess.last(), Some(&0.0), "the fit to all is the reference: {excess:?}");
@@ -52,6 +56,17 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
         assert!(!b.bytes(&format!("t/{name}")).is_empty(), "{name}");
     }
     assert_eq!(timeless(&b.json_file("t/tradeoff.json")), timeless(&found));
+    let again = b.json(&["plot", "tradeoff", "t/tradeoff.json", "--only", "parameters-part", "--out", "p.svg"]);
+    assert!(b.text("p.svg") == b.text("t/parameters-part.svg"), "the file holds all that the plot shows");
+    let drawn = &again["plots"][0]["curves"][0];
+    let want: Vec<f64> = errors(&found, "lambert+phong", "parameters").into_iter().filter(|e| *e > 0.0).collect();
+    assert_eq!((&drawn["name"], &drawn["y"]), (&"lambert+phong".into(), &want.into()));
+    let all = b.json(&["plot", "tradeoff", "t/tradeoff.json", "--out", "all.png"]);
+    let mut names: Vec<&str> =
+        all["plots"].as_array().expect("plots").iter().map(|p| p["name"].as_str().unwrap()).collect();
+    names.sort_unstable();
+    let files = b.list("t");
+    assert_eq!(names, files.iter().filter_map(|n| n.strip_suffix(".svg")).collect::<Vec<_>>());
     let csv = b.text("t/tradeoff.csv");
     let rows = csv.lines().filter(|l| !l.starts_with('#')).count();
     assert_eq!(rows, 1 + 5, "{csv}");
@@ -63,24 +78,9 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
 #[test]
 fn independent_samples_have_their_slope_and_a_cut_path_its_bias_whatever_the_threads() {
     let b = Bench::new();
-    let args = [
-        "tradeoff",
-        "render",
-        "--scene",
-        "sphere-on-plane",
-        "--size",
-        "24",
-        "--samples",
-        "8,32,128",
-        "--trials",
-        "6",
-        "--ways",
-        "scene,independent",
-        "--depths",
-        "1",
-        "--seed",
-        "5",
-    ];
+    let args = typed(
+        "tradeoff render --scene sphere-on-plane --size 24 --samples 8,32,128 --trials 6 --ways scene,independent --depths 1 --seed 5",
+    );
     let found = b.json(&args);
     let independent = slope(&found, "independent samples", "error");
     assert!((independent + 0.5).abs() < 0.05, "{independent}");
@@ -96,20 +96,8 @@ fn independent_samples_have_their_slope_and_a_cut_path_its_bias_whatever_the_thr
 #[test]
 fn readings_average_out_and_take_the_instruments_time() {
     let b = Bench::new();
-    let args = [
-        "tradeoff",
-        "simulate",
-        "--material",
-        "satin",
-        "--scan",
-        "hemisphere:15",
-        "--knobs",
-        "readings",
-        "--average",
-        "1,4,16",
-        "--trials",
-        "12",
-    ];
+    let args =
+        typed("tradeoff simulate --material satin --scan hemisphere:15 --knobs readings --average 1,4,16 --trials 12");
     let found = b.json(&args);
     for name in ["reading", "brdf", "parameters"] {
         let slope = slope(&found, "readings averaged", name);
@@ -124,22 +112,9 @@ fn readings_average_out_and_take_the_instruments_time() {
 #[test]
 fn means_over_cones_are_as_good_as_they_are_asked_for_and_effects_have_their_size() {
     let b = Bench::new();
-    let args = [
-        "tradeoff",
-        "simulate",
-        "--material",
-        "satin",
-        "--instrument",
-        "commercial",
-        "--scan",
-        "in-plane:15",
-        "--knobs",
-        "quadrature,effects",
-        "--trials",
-        "2",
-        "--target-errors",
-        "1e-2,1e-6",
-    ];
+    let args = typed(
+        "tradeoff simulate --material satin --instrument commercial --scan in-plane:15 --knobs quadrature,effects --trials 2 --target-errors 1e-2,1e-6",
+    );
     let found = b.json(&args);
     let points = curve(&found, "means over cones")["points"].as_array().expect("points");
     assert!(points.iter().all(|p| p["kept"] == 2), "{points:?}");
@@ -158,28 +133,9 @@ fn means_over_cones_are_as_good_as_they_are_asked_for_and_effects_have_their_siz
 #[test]
 fn the_whole_chain_is_off_by_what_its_links_say() {
     let b = Bench::new();
-    let args = [
-        "tradeoff",
-        "chain",
-        "--material",
-        "satin",
-        "--scan",
-        "hemisphere:15",
-        "--electrons",
-        "300",
-        "--size",
-        "24",
-        "--average",
-        "1,4",
-        "--strides",
-        "1,3",
-        "--samples",
-        "16,64",
-        "--trials",
-        "6",
-        "--budget",
-        "10h",
-    ];
+    let args = typed(
+        "tradeoff chain --material satin --scan hemisphere:15 --electrons 300 --size 24 --average 1,4 --strides 1,3 --samples 16,64 --trials 6 --budget 10h",
+    );
     let found = b.json(&args);
     let share = &found["chain"][0];
     assert_eq!((number(&share["readings"]), number(&share["stride"]), number(&share["samples"])), (4.0, 1.0, 64.0));
@@ -192,8 +148,8 @@ fn the_whole_chain_is_off_by_what_its_links_say() {
 fn what_can_t_be_had_is_said() {
     let b = Bench::new();
     b.paint("paint.csv");
-    let fit = ["tradeoff", "fit", "paint.csv", "--parts", "3,5", "--trials", "2", "--targets", "1%"];
-    let render = ["tradeoff", "render", "--size", "8", "--samples", "4,8", "--trials", "2", "--ways", "scene"];
+    let fit = typed("tradeoff fit paint.csv --parts 3,5 --trials 2 --targets 1%");
+    let render = typed("tradeoff render --size 8 --samples 4,8 --trials 2 --ways scene");
     let ran = b.run(&[&render[..], &["--advise", "error=1e-9", "--json"]].concat());
     assert_eq!(ran.code, Some(1));
     let found = ran.json();

@@ -218,7 +218,7 @@ fn the_tables_hold_the_numbers_of_the_json() {
     let Some(mut page) = page_or_skip("the_tables_hold_the_numbers_of_the_json") else { return };
     open(&mut page);
     let rows = page.eval(
-        "[...document.querySelectorAll('table.parameters tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))",
+        "[...document.querySelectorAll('table.values tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))",
     );
     let numbers = Run::shared().numbers();
     let rows = rows.as_array().unwrap();

@@ -161,13 +161,30 @@ def lapack(options):
 
 def markdown(report):
     """What is printed."""
-    m, tables = report["machine"], report["tables"]
-    peers = [n for n in next(iter(tables.values()))["solvers"] if n != "goniofit"]
-    threads, load = report["threads"], report["load_average"]
+    m = report["machine"]
+    load = report["load_average"]
     yield f"{m['processor']}, {m['cpus']} CPUs, {m['system']}; {report['date']}; commit {report['commit']};"
-    yield "; ".join(report["versions"].values()) + f"; varpro's LAPACK {', '.join(report['lapack'])};"
-    yield f"medians of {report['rounds']} rounds; {threads} threads;"
     yield f"load average {load[0]:.1f} before, {load[1]:.1f} after."
+    yield ""
+    yield from summary(report)
+    yield ""
+    yield "What each reached:"
+    yield ""
+    yield "| table | solver | cost / best − 1 | n | evaluations | whole process [s] | peak [MB] |"
+    yield "|---" * 7 + "|"
+    for name, result in report["tables"].items():
+        for solver, f in result["solvers"].items():
+            reached = f"{f['cost_over_best']:.1e} | {f['exponent']:.8g} | {f['evaluations']}"
+            yield f"| {name} | {solver} | {reached} | {f['median_wall']:.2f} | {f['peak_mb']:.0f} |"
+
+
+def summary(report):
+    """The tables that a reader looks for first: times of the fits, what each solver takes and reaches, passes over the samples."""
+    tables, threads = report["tables"], report["threads"]
+    solvers = list(next(iter(tables.values()))["solvers"])
+    peers = [n for n in solvers if n != "goniofit"]
+    yield "; ".join(report["versions"].values()) + f"; varpro's LAPACK {', '.join(report['lapack'])};"
+    yield f"medians of {report['rounds']} rounds; {threads} threads."
     yield ""
     yield "Seconds of a fit, and how many times goniofit's that is:"
     yield ""
@@ -175,9 +192,20 @@ def markdown(report):
     yield "|---" * (3 + len(peers)) + "|"
     for name, result in tables.items():
         found = result["solvers"]
-        cells = [f"{found[p]['median_seconds']:.3f} ({found[p]['times_goniofit']:.2f}×)" for p in peers]
+        cells = [f"{found[p]['median_seconds']:.3f} ({found[p]['times_goniofit']:.0f}×)" for p in peers]
         own = found["goniofit"]
         yield f"| {name} | {own['exponent']:.4g} | {own['median_seconds']:.3f} | " + " | ".join(cells) + " |"
+    yield ""
+    yield "Least and most over all tables:"
+    yield ""
+    yield "| solver | times goniofit's | cost over the best − 1, at most | whole process [s] | peak memory [MB] |"
+    yield "|---" * 5 + "|"
+    for solver in solvers:
+        found = [result["solvers"][solver] for result in tables.values()]
+        times, walls, peaks = ([f[key] for f in found] for key in ("times_goniofit", "median_wall", "peak_mb"))
+        off = max(f["cost_over_best"] for f in found)
+        walls, peaks = f"{min(walls):.2f} to {max(walls):.2f}", f"{min(peaks):.0f} to {max(peaks):.0f}"
+        yield f"| {solver} | {min(times):.0f} to {max(times):.0f} | {off:.1e} | {walls} | {peaks} |"
     yield ""
     yield f"Milliseconds of the quickest pass over the samples ({threads} threads), and goniofit's fit in passes:"
     yield ""
@@ -188,15 +216,6 @@ def markdown(report):
         cells = [f"{1e3 * passes[kind]:.2f}" for kind in FLOORS]
         cells += [f"{own / passes[kind]:.0f}" for kind in ("f64", "f64_folded")]
         yield f"| {name} | " + " | ".join(cells) + " |"
-    yield ""
-    yield "What each reached:"
-    yield ""
-    yield "| table | solver | cost / best − 1 | n | evaluations | whole process [s] | peak [MB] |"
-    yield "|---" * 7 + "|"
-    for name, result in tables.items():
-        for solver, f in result["solvers"].items():
-            reached = f"{f['cost_over_best']:.1e} | {f['exponent']:.8g} | {f['evaluations']}"
-            yield f"| {name} | {solver} | {reached} | {f['median_wall']:.2f} | {f['peak_mb']:.0f} |"
 
 
 def tables_of(options):

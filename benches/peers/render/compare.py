@@ -2,6 +2,7 @@
 """goniofit beside Mitsuba 3: time from process start to file written at a given relMSE, and steady rate. See ../README.md."""
 
 import argparse
+import importlib.metadata
 import json
 import math
 import os
@@ -167,7 +168,9 @@ def main():
     parser.add_argument("--targets", type=float, nargs="+", default=[1e-3, 1e-4], help="relMSE to reach, falling")
     parser.add_argument("--most", type=int, default=4096, help="samples per pixel that are tried at most")
     args = parser.parse_args()
-    print(f"{SIZE}², {args.threads} threads, best of {args.rounds}; load {os.getloadavg()[0]:.1f} at the start")
+    peer = f"Mitsuba {importlib.metadata.version('mitsuba')}"
+    print(f"{SIZE}², {args.threads} threads, best of {args.rounds} processes; {peer}; in brackets samples per pixel.\n")
+    note(f"load {os.getloadavg()[0]:.1f} at the start")
     head = [f"{what} {t:g}" for t in args.targets for what in ("goniofit, s to", "Mitsuba, s to", "ratio")]
     print("| scene | " + " | ".join(head) + " | goniofit, Msamples/s | Mitsuba | ratio |")
     print("|---" * (len(head) + 4) + "|", flush=True)
@@ -180,7 +183,7 @@ def main():
             spp = SCENES[scene][3]
             rates = {t.name: SIZE * SIZE * spp / t.steady(scene, spp) / 1e6 for t in tracers}
             print(row(scene, needed, times, rates, args.targets), flush=True)
-    print(f"\nload {os.getloadavg()[0]:.1f} at the end; in brackets samples per pixel")
+    note(f"load {os.getloadavg()[0]:.1f} at the end")
 
 
 if __name__ == "__main__":

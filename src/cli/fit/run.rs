@@ -95,7 +95,10 @@ fn one(
         Wanted::Auto => fit_best_model(&table, options),
         Wanted::Model(_) => fit(&table, options),
     };
-    let fitted = fitted.map_err(|error| refused(args, file, error))?;
+    let mut fitted = fitted.map_err(|error| refused(args, file, error))?;
+    if let Some(record) = &mut fitted.material.fit {
+        record.instrument = args.through.clone().filter(|name| name != "-");
+    }
     if args.log {
         log(&fitted, ui);
     }
@@ -105,7 +108,7 @@ fn one(
     }
     let page = if args.report { target.map(|t| t.with_extension("html")) } else { None };
     if let (Some(page), Some(target)) = (&page, target) {
-        let through = options.through.clone();
+        let through = args.through.clone().map(|name| (name, options.through.clone()));
         let run =
             Run::of_fit(file, table, &target.display().to_string(), &fitted.material, through, report::this_run());
         report::write(&run, page)?;

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::subject::Subjects;
+use super::subject::{Subjects, seen};
 use super::{Drawn, OutputArgs};
 use crate::chain;
 use crate::cli::failure::Failure;
 use crate::cli::info::Reading;
+use crate::cli::instrument::read_sight;
+use crate::cli::ui::Ui;
 use crate::measurement::{Measurement, formats};
 use crate::report::plot::Figure;
 use crate::report::views::{
@@ -51,7 +53,7 @@ pub(super) struct ResidualArgs {
     /// Leave out readings with θi or θo above this, degrees, as the fit did
     #[arg(long, default_value_t = 80.0, value_name = "DEG", value_parser = parse_incidence)]
     max_angle: f64,
-    /// The instrument that the fit was made through
+    /// The instrument that the fit was made through [default: the one that it names]
     #[arg(long, value_name = "INSTRUMENT")]
     through: Option<String>,
     #[command(flatten)]
@@ -70,8 +72,8 @@ fn parse_statistic(text: &str) -> Result<Statistic, String> {
 }
 
 /// Polar lobes, or slices: a panel an incidence.
-pub(super) fn curves(args: &CurveArgs, polar: bool) -> Result<Drawn, Failure> {
-    let subjects = Subjects::read(&args.files, &args.output.reading.options())?;
+pub(super) fn curves(args: &CurveArgs, polar: bool, ui: &Ui) -> Result<Drawn, Failure> {
+    let subjects = Subjects::read(&args.files, &args.output.reading.options(), ui)?;
     let channels = subjects.channels();
     let channel = match &args.channel {
         None => default_channel(channels),
@@ -115,7 +117,7 @@ fn slice_json(slice: &Slice, channel: usize) -> Value {
 }
 
 /// Residual maps of a fit.
-pub(super) fn residuals(args: &ResidualArgs) -> Result<Drawn, Failure> {
+pub(super) fn residuals(args: &ResidualArgs, ui: &Ui) -> Result<Drawn, Failure> {
     let table = formats::read(&args.measurement, &args.output.reading.options())?;
     let material = chain::load_material(&args.fit)?;
     if material.channels != table.channels {
@@ -127,8 +129,11 @@ pub(super) fn residuals(args: &ResidualArgs) -> Result<Drawn, Failure> {
             material.channels.join(", ")
         )));
     }
-    let sight = args.through.as_deref().map(crate::cli::instrument::read_sight).transpose()?;
-    let maps = residual_maps(&table, &Predicted::new(&material, sight), args.max_angle);
+    let predicted = match &args.through {
+        Some(name) => Predicted::new(&material, Some(read_sight(name)?)),
+        None => seen(&material, &args.fit, ui),
+    };
+    let maps = residual_maps(&table, &predicted, args.max_angle);
     let statistic = args.statistic;
     let all: Vec<(&Binned, bool)> = maps.half_diff.iter().map(|m| (m, true)).chain([(&maps.in_out, false)]).collect();
     let range = residual_range(&maps, statistic);

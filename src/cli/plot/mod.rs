@@ -2,6 +2,7 @@
 
 mod kinds;
 mod subject;
+mod tradeoff;
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,8 @@ use kinds::{CurveArgs, ResidualArgs};
   goniofit plot polar gold.binary gold.json --incidence 15,45,75 --out lobes.svg
   goniofit plot slice lab.csv lab.json --incidence 30 --log --out slice.png
   goniofit plot residuals lab.csv lab.json --out residuals.svg
-  goniofit plot coverage lab.csv --out coverage.svg")]
+  goniofit plot coverage lab.csv --out coverage.svg
+  goniofit plot tradeoff out/tradeoff.json --out curves.svg")]
 pub(super) struct Args {
     #[command(subcommand)]
     kind: Kind,
@@ -35,19 +37,28 @@ enum Kind {
     Residuals(ResidualArgs),
     /// Where on the hemisphere readings were taken
     Coverage(CoverageArgs),
+    /// What accuracy costs in time: the curves of a sweep
+    Tradeoff(tradeoff::Args),
+}
+
+/// Where a figure of a measurement goes, and how that is read.
+#[derive(Debug, Clone, clap::Args)]
+struct OutputArgs {
+    #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten, next_help_heading = "Reading")]
+    reading: Reading,
 }
 
 /// Where a figure goes.
 #[derive(Debug, Clone, clap::Args)]
-struct OutputArgs {
+struct FigureArgs {
     /// Where to write the figure: .svg or .png
     #[arg(long, value_name = "FIGURE.svg|png")]
     out: PathBuf,
     /// Width of a PNG, pixels [default: three for each of the drawing's own]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=20_000))]
     width: Option<u32>,
-    #[command(flatten, next_help_heading = "Reading")]
-    reading: Reading,
 }
 
 #[derive(Debug, clap::Args)]
@@ -61,16 +72,18 @@ struct CoverageArgs {
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let (output, inputs): (_, Vec<&Path>) = match &args.kind {
-        Kind::Polar(a) | Kind::Slice(a) => (&a.output, a.files.iter().map(Path::new).collect()),
-        Kind::Residuals(a) => (&a.output, vec![&a.measurement, Path::new(&a.fit)]),
-        Kind::Coverage(a) => (&a.output, vec![&a.measurement]),
+        Kind::Polar(a) | Kind::Slice(a) => (&a.output.figure, a.files.iter().map(Path::new).collect()),
+        Kind::Residuals(a) => (&a.output.figure, vec![&a.measurement, Path::new(&a.fit)]),
+        Kind::Coverage(a) => (&a.output.figure, vec![&a.measurement]),
+        Kind::Tradeoff(a) => (&a.output, vec![&a.sweep]),
     };
     output.check(&inputs, ui)?;
     let (figure, mut object) = match &args.kind {
-        Kind::Polar(a) => kinds::curves(a, true)?,
-        Kind::Slice(a) => kinds::curves(a, false)?,
-        Kind::Residuals(a) => kinds::residuals(a)?,
-        Kind::Coverage(a) => kinds::coverage(&a.measurement, &output.reading)?,
+        Kind::Polar(a) => kinds::curves(a, true, ui)?,
+        Kind::Slice(a) => kinds::curves(a, false, ui)?,
+        Kind::Residuals(a) => kinds::residuals(a, ui)?,
+        Kind::Coverage(a) => kinds::coverage(&a.measurement, &a.output.reading)?,
+        Kind::Tradeoff(a) => tradeoff::curves(a)?,
     };
     output.write(&figure)?;
     object["out"] = json!(output.out);
@@ -83,7 +96,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 /// A figure, and the numbers in it.
 type Drawn = (Figure, Value);
 
-impl OutputArgs {
+impl FigureArgs {
     /// Before anything is read: the name says a format, and the figure destroys no input.
     fn check(&self, inputs: &[&Path], ui: &Ui) -> Result<(), Failure> {
         stdout_is_free(&self.out, ui)?;

@@ -5,7 +5,9 @@ use std::path::Path;
 use crate::brdf::Material;
 use crate::chain::{self, Source};
 use crate::cli::failure::Failure;
+use crate::cli::ui::Ui;
 use crate::measurement::{Dimension, Measurement, ReadOptions, TableBrdf};
+use crate::report::run::fitted_through;
 use crate::report::views::{Predicted, Shown};
 
 /// Files by what they hold.
@@ -15,26 +17,33 @@ pub(super) struct Subjects {
 }
 
 impl Subjects {
-    /// Reads the files: at most one measurement, any number of materials of the same channels.
-    pub fn read(files: &[String], options: &ReadOptions) -> Result<Self, Failure> {
-        let mut found = Self { table: None, materials: Vec::new() };
+    /// Reads the files: at most one measurement, any number of materials of the same channels. Beside a measurement, fits that were made through an
+    /// instrument are drawn through it.
+    pub fn read(files: &[String], options: &ReadOptions, ui: &Ui) -> Result<Self, Failure> {
+        let (mut table, mut materials) = (None, Vec::new());
         for file in files {
             match chain::load(file, options)? {
-                Source::Fitted(material) => found.materials.push((name_of(file), Predicted::new(&material, None))),
-                Source::Measured(_) if found.table.is_some() => {
+                Source::Fitted(material) => materials.push((file, material)),
+                Source::Measured(_) if table.is_some() => {
                     return Err(Failure::usage(format!(
                         "{file}: expected one measurement and fits of it, found another"
                     )));
                 }
-                Source::Measured(table) => {
-                    let all: Vec<usize> = (0..table.channels.len()).collect();
+                Source::Measured(measured) => {
+                    let all: Vec<usize> = (0..measured.channels.len()).collect();
                     // A table that can't be interpolated is shown by its readings alone.
                     let brdf =
-                        if table.dimension == Dimension::Flat { None } else { TableBrdf::new(&table, &all).ok() };
-                    found.table = Some((*table, brdf));
+                        if measured.dimension == Dimension::Flat { None } else { TableBrdf::new(&measured, &all).ok() };
+                    table = Some((*measured, brdf));
                 }
             }
         }
+        let beside = table.is_some();
+        let predicted = |(file, material): (&String, Box<Material>)| {
+            let plain = || Predicted::new(&material, None);
+            (name_of(file), if beside { seen(&material, file, ui) } else { plain() })
+        };
+        let found = Self { table, materials: materials.into_iter().map(predicted).collect() };
         found.agree(files)?;
         Ok(found)
     }
@@ -69,6 +78,25 @@ impl Subjects {
             ))),
         }
     }
+}
+
+/// A fit as it is compared with readings: through the instrument that it was made through, where that is known.
+pub(super) fn seen(material: &Material, file: &str, ui: &Ui) -> Predicted {
+    let beside = Path::new(file).parent().unwrap_or(Path::new(""));
+    let sight = match fitted_through(material, None, &[Path::new(""), beside]) {
+        Ok(None) => None,
+        Ok(Some((name, sight))) => {
+            ui.note(&format!("{file}: drawn as {name} sees it, through which it was fitted"));
+            sight
+        }
+        Err(unknown) => {
+            ui.warn(&format!(
+                "{file}: fitted through {unknown}; it is drawn as the surface, not as the readings see it"
+            ));
+            None
+        }
+    };
+    Predicted::new(material, sight)
 }
 
 /// What the legend calls a file.

@@ -12,7 +12,6 @@ use crate::tradeoff::{Effort, Sweep};
 mod advice;
 mod chain;
 mod fit;
-mod plots;
 mod print;
 mod render;
 mod simulate;

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::plots;
 use crate::cli::failure::Failure;
 use crate::cli::output::{write_bytes, write_text};
+use crate::report::views;
 use crate::tradeoff::{Sweep, to_csv};
 
 /// Width of the PNG plots, pixels.
@@ -20,9 +20,10 @@ pub(super) fn all(folder: &Path, sweep: &Sweep, object: &Value) -> Result<Vec<St
         write_text(&folder.join(name), text)?;
     }
     let mut names = files.map(|(name, _)| name.to_owned()).to_vec();
-    for plot in plots::all(sweep) {
+    let drawn: views::Sweep = serde_json::from_value(object.clone()).map_err(|e| Failure::work(e.to_string()))?;
+    for plot in drawn.plots() {
         let png = plot.figure.to_png(PIXELS).map_err(|e| Failure::work(format!("{}: {e}", plot.name)))?;
-        write_text(&folder.join(format!("{}.svg", plot.name)), &plot.figure.to_svg())?;
+        write_text(&folder.join(format!("{}.svg", plot.name)), &(plot.figure.to_svg() + "\n"))?;
         write_bytes(&folder.join(format!("{}.png", plot.name)), &png)?;
         names.push(format!("{}.svg and .png", plot.name));
     }

@@ -3,10 +3,10 @@
 use serde_json::Value;
 
 use super::reproduce::typed;
-use crate::chain::{Stage, scene_plan};
+use crate::chain::{NOISY_DETECTOR, Stage, scene_plan};
 use crate::control::Plan;
 use crate::gonio::{self, Instrument};
-use crate::report::run::{DEMO_INSTRUMENT, Kind, Run, RunFit, known_instrument};
+use crate::report::run::{Kind, Run, RunFit, known_instrument};
 use crate::report::views::Predicted;
 use crate::report::words::percent;
 
@@ -64,12 +64,12 @@ fn instrument(run: &Run) -> Option<Result<Listed, String>> {
     let name = run.instrument.as_deref()?;
     let truth = run.truth.as_ref()?.material();
     let mut words = vec!["goniofit", "effects", "--material", &run.title];
-    let own = name == DEMO_INSTRUMENT;
+    let own = name == NOISY_DETECTOR;
     if !own {
         words.extend(["--instrument", name]);
     }
     let command = typed(&words);
-    let known = if own { Some(Instrument::default()) } else { known_instrument(name, run.made.folder.as_deref()) };
+    let known = if own { Some(Instrument::default()) } else { known_instrument(name, &run.folders()) };
     Some(match known {
         Some(known) => {
             let effects = plain(gonio::plan(&known, &truth.channels));
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn effects_are_those_of_the_runs_instrument_or_none() {
-        let found = effects(&measured_by(DEMO_INSTRUMENT));
+        let found = effects(&measured_by(NOISY_DETECTOR));
         assert_eq!((found.lists.len(), found.missing), (1, None));
         assert!(!found.lists[0].command.contains("--instrument"), "{}", found.lists[0].command);
 

@@ -196,7 +196,11 @@ fn merits(run: &Run) -> Vec<Merit> {
         ("Status", |_, r| r.status.clone()),
         ("Loss", |_, r| r.robust.as_ref().map_or_else(|| r.loss.clone(), |robust| format!("{}, {robust}", r.loss))),
         ("Weights", |_, r| r.weights.clone()),
-        ("Seen through", |_, r| r.through.clone().unwrap_or_else(|| "–".into())),
+        ("Seen through", |_, r| match (&r.instrument, &r.through) {
+            (Some(name), Some(through)) => format!("{name}: {through}"),
+            (None, Some(through)) => through.clone(),
+            _ => "–".into(),
+        }),
         ("Samples", |_, r| match &r.subset {
             Some(s) => format!("{} of {}", count(s.samples), count(s.of)),
             None => count(r.samples),

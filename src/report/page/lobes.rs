@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use serde_json::{Value, json};
 
+use super::peaks::{Peaks, peaks};
 use crate::measurement::Dimension;
 use crate::report::plot::{Scale, dot_class, line_class};
 use crate::report::run::Run;
@@ -43,6 +44,12 @@ pub(super) struct Lobes {
     pub frames: Vec<Frame>,
     /// A small polar chart of each incidence.
     pub all: Vec<(String, String)>,
+    /// Peaks of the channel that is shown first.
+    pub peaks: Peaks,
+    pub peaks_of: String,
+    pub unit: &'static str,
+    /// Whether readings have error bars.
+    pub has_sigma: bool,
     /// That not all readings are shown, where that is so.
     pub note: String,
     pub data: Value,
@@ -89,6 +96,10 @@ pub(super) fn lobes(run: &Run) -> Option<Lobes> {
         log,
         frames: frames.collect(),
         all: slices.iter().map(small).collect(),
+        peaks: peaks(&slices, channel),
+        peaks_of: names[channel].to_owned(),
+        unit,
+        has_sigma: slices.iter().flat_map(|s| &s.curves).any(|c| c.sigma.is_some()),
         note: if thinned.contains(&true) { thinned_note() } else { String::new() },
         data: json!({
             "unit": unit, "channels": names, "incidences": slices.iter().map(|s| s.incidence_deg).collect::<Vec<_>>(),

@@ -1,6 +1,7 @@
 //! What was measured, and how well.
 
-use crate::report::run::Run;
+use crate::measurement::Directions;
+use crate::report::run::{Run, Table};
 use crate::report::views::{albedo_curves, coverage, coverage_figure, default_channel, energy_figure, masked_figure};
 use crate::report::words::{count, number, percent};
 
@@ -44,8 +45,9 @@ pub(super) fn measured(run: &Run) -> Option<Measured> {
     let cover = coverage(&table.measurement);
     let own = s.incidences_deg.clone().unwrap_or_default();
     let drawn = cover.as_ref().map(|c| {
+        let symmetric = if is_merl(table) { " The format has the other azimuths follow by symmetry." } else { "" };
         let said = format!(
-            "{} of the hemisphere's solid angle has valid readings, over all incidences together.",
+            "{} of the hemisphere's solid angle has valid readings, over all incidences together.{symmetric}",
             percent(c.covered)
         );
         (coverage_figure(c, &own, false).inline(), said)
@@ -69,6 +71,11 @@ pub(super) fn measured(run: &Run) -> Option<Measured> {
         no_scatter: table.scatter.as_ref().err().cloned(),
         names: table.measurement.channels.clone(),
     })
+}
+
+/// Whether entries stand for a pair of directions, the swapped pair and their mirror images, as MERL's do.
+fn is_merl(table: &Table) -> bool {
+    matches!(table.measurement.directions, Directions::Merl(_))
 }
 
 fn facts(run: &Run) -> Vec<Fact> {
@@ -113,6 +120,7 @@ fn facts(run: &Run) -> Vec<Fact> {
                 percent(r.median_relative_difference),
                 count(r.pairs as u64)
             ),
+            None if is_merl(table) => "by the format: an entry stands for both directions".into(),
             None => "no swapped pairs to compare".into(),
         },
     );

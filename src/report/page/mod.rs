@@ -6,6 +6,7 @@ mod effects;
 mod fits;
 mod lobes;
 mod measured;
+mod peaks;
 mod pictures;
 mod pixels;
 mod reproduce;
@@ -43,6 +44,8 @@ struct Page<'a> {
     effects: effects::Effects,
     reproduce: reproduce::Reproduce,
     missing: Missing,
+    /// Which fits are drawn through an instrument.
+    seen: String,
     data: String,
     css: String,
 }
@@ -94,10 +97,18 @@ pub fn page(run: &Run) -> Result<Written, ReportError> {
         residuals,
         pictures,
         missing,
+        seen: seen(run),
         data,
     };
     let html = page.render().map_err(|e| ReportError::Page(e.to_string()))?;
     Ok(Written { html, missing: page.missing.list(), warnings })
+}
+
+/// What a reader must know of fits that are compared with readings as an instrument sees them.
+fn seen(run: &Run) -> String {
+    let one = |f: &super::run::RunFit| f.through.as_ref().map(|name| format!("{} as {name} sees it", f.label));
+    let all: Vec<String> = run.fits.iter().filter_map(one).collect();
+    if all.is_empty() { String::new() } else { format!("Like the readings, {}.", all.join(", ")) }
 }
 
 fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
@@ -118,7 +129,7 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
     if !has_pictures {
         let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
         let mut words = vec!["goniofit", "validate", &table];
-        words.extend(run.fits.iter().map(|f| f.file.as_str()));
+        words.extend(run.fits.iter().map(|f| reproduce::as_typed(run, &f.file)));
         words.extend(["--out", "DIR", "--report"]);
         let command = reproduce::typed(&words);
         missing.pictures = format!("There are no pictures here. Render table and fits under the same light: {command}");

@@ -38,7 +38,7 @@ pub(super) struct Pictures {
     pub exposure: String,
     pub compared: Vec<String>,
     pub lines: Vec<Line>,
-    /// That pixels are means, where they are.
+    /// What must be known of them.
     pub note: String,
     pub data: Value,
 }
@@ -72,11 +72,6 @@ pub(super) fn pictures(run: &Run) -> Result<Option<Pictures>, ReportError> {
     let encoded: Vec<Value> =
         all.iter().zip(&images).map(|(p, i)| json!({ "label": p.label, "pixels": packed(i) })).collect();
     let (width, height) = (images[0].width, images[0].height);
-    let note = if factor == 1 {
-        String::new()
-    } else {
-        format!("Pixels here are means over {factor}×{factor} pixels of the pictures; the numbers are of all pixels.")
-    };
     let compared: Vec<&RunFit> = run.fits.iter().filter(|f| f.image.is_some()).collect();
     Ok(Some(Pictures {
         width,
@@ -87,9 +82,32 @@ pub(super) fn pictures(run: &Run) -> Result<Option<Pictures>, ReportError> {
         exposure: crate::report::plot::minus(&format!("{exposure:+.2}")),
         lines: lines(&compared),
         compared: compared.iter().map(|f| f.label.clone()).collect(),
-        note,
+        note: notes(run, factor, all.len()),
         data: json!({ "width": width, "height": height, "factor": factor, "exposure": exposure, "range": range, "pictures": encoded }),
     }))
+}
+
+/// What a reader must know of the pictures: that they are smaller here, that some are not shown, that they differ in what they show.
+fn notes(run: &Run, factor: usize, shown: usize) -> String {
+    let mut notes = Vec::new();
+    if factor > 1 {
+        notes.push(format!(
+            "Pixels here are means over {factor}×{factor} pixels of the pictures; the numbers are of all pixels."
+        ));
+    }
+    if shown < run.pictures.len() {
+        notes.push("Pictures of another size than the first are left out.".into());
+    }
+    let through = |f: &&RunFit| f.material().fit.as_ref().is_some_and(|r| r.through.is_some());
+    let surfaces: Vec<&str> = run.fits.iter().filter(through).map(|f| f.label.as_str()).collect();
+    if run.reference == "table" && !surfaces.is_empty() {
+        notes.push(format!(
+            "{} was fitted through the instrument: its picture is of the surface, the table's of what the instrument saw, so that sharp highlights differ by \
+             the instrument's own blur.",
+            surfaces.join(", ")
+        ));
+    }
+    notes.join(" ")
 }
 
 /// About how wide the picture beside the title is, pixels.

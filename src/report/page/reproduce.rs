@@ -1,5 +1,7 @@
 //! How to make all of it again.
 
+use std::path::Path;
+
 use crate::report::run::{Kind, Run};
 
 /// A command and what it makes.
@@ -31,6 +33,12 @@ pub(super) fn reproduce(run: &Run) -> Reproduce {
     }
 }
 
+/// A file as it is typed where the run was made.
+pub(super) fn as_typed<'a>(run: &Run, file: &'a str) -> &'a str {
+    let within = run.made.folder.as_deref().and_then(|folder| Path::new(file).strip_prefix(folder).ok());
+    within.and_then(Path::to_str).unwrap_or(file)
+}
+
 /// Words as they are typed in a shell.
 pub(super) fn typed<S: AsRef<str>>(words: &[S]) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+%@".contains(c);
@@ -47,23 +55,22 @@ fn commands(run: &Run) -> Vec<Command> {
         list.push(Command { makes: makes.into(), typed: typed(words) });
     };
     let path = run.table.as_ref().ok().map(|t| t.path.display().to_string());
-    let files: Vec<&str> = run.fits.iter().map(|f| f.file.as_str()).collect();
+    let files: Vec<&str> = run.fits.iter().map(|f| as_typed(run, &f.file)).collect();
     if let Some(path) = &path {
         push("what is in the measurement", &["goniofit", "info", path]);
         push("the map of the hemisphere", &["goniofit", "plot", "coverage", path, "--out", "coverage.svg"]);
         push("polar lobes", &[&["goniofit", "plot", "polar", path][..], &files, &["--out", "lobes.svg"]].concat());
         push("slices", &[&["goniofit", "plot", "slice", path][..], &files, &["--out", "slices.svg"]].concat());
-        for fit in &run.fits {
-            let mut words = vec!["goniofit", "plot", "residuals", path, &fit.file];
-            let seen = fit.material().fit.as_ref().is_some_and(|record| record.through.is_some());
-            if let Some(instrument) = run.instrument.as_deref().filter(|_| seen) {
+        for (fit, file) in run.fits.iter().zip(&files) {
+            let mut words = vec!["goniofit", "plot", "residuals", path, file];
+            if let Some(instrument) = &fit.through {
                 words.extend(["--through", instrument]);
             }
             words.extend(["--out", "residuals.svg"]);
             push("residual maps", &words);
         }
     }
-    if let Some((first, others)) = run.pictures.split_first() {
+    if let Some((first, others)) = run.pictures.split_first().filter(|(first, _)| first.label == run.reference) {
         for other in others {
             let [a, b] = [&other.file, &first.file].map(|f| run.folder.join(f).display().to_string());
             push("numbers of the pictures", &["goniofit", "compare", &a, &b]);

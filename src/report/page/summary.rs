@@ -67,7 +67,10 @@ fn verdict(run: &Run) -> Vec<String> {
     let Some(fit) = best(run) else { return vec!["There is no fit to judge.".into()] };
     if let Some(residual) = fit.material().fit.as_ref().and_then(|r| r.residual.as_ref()) {
         let known = if residual.noise_from == "sigma" { "stated noise" } else { "noise between neighbours" };
-        let share = percent(residual.structured_share);
+        let share = match residual.structured_share {
+            share if share > 0.995 => "nearly all".into(),
+            share => percent(share),
+        };
         said.push(if residual.structured_share <= 0.05 {
             format!("{} describes the readings to within their {known}.", fit.label)
         } else if residual.structured_share <= 0.5 {
@@ -83,7 +86,7 @@ fn verdict(run: &Run) -> Vec<String> {
             )
         });
     }
-    let reference = run.pictures.first().map_or("reference", |p| p.label.as_str());
+    let reference = &run.reference;
     if let Some(s) = fit.image.as_ref().map(|image| &image["significance"]).filter(|s| s.is_object()) {
         let (differing, pixels) = (s["pixels_differing"].as_u64().unwrap_or(0), s["pixels"].as_u64().unwrap_or(0));
         said.push(match differing {

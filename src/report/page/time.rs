@@ -1,9 +1,8 @@
 //! What accuracy took in time, as far as the run's files have it.
 
-use serde_json::Value;
-
-use crate::report::plot::{LogLog, Marks, Point, Series, minus};
+use crate::report::plot::{Heading, LogLog, Marks, Point, Series, minus};
 use crate::report::run::Run;
+use crate::report::views::{self, SweepSlope};
 use crate::report::words::{count, number, percent, time as told};
 
 /// A stage and its time.
@@ -79,7 +78,7 @@ fn fits(run: &Run) -> Option<String> {
     };
     let series: Vec<Series> = run.fits.iter().zip(colors).filter_map(of).collect();
     let chart = LogLog {
-        title: "Time and rmse of the fits".into(),
+        heading: Heading { title: "Time and rmse of the fits".into(), ..Heading::default() },
         x_label: "time of the fit [s]".into(),
         y_label: "rmse".into(),
         series,
@@ -89,74 +88,29 @@ fn fits(run: &Run) -> Option<String> {
 }
 
 /// Charts and slopes of a `tradeoff.json`.
-fn sweep(found: &Value) -> Sweep {
-    let text = |v: &Value| v.as_str().unwrap_or_default().to_owned();
-    let curves: Vec<&Value> = found["curves"].as_array().into_iter().flatten().collect();
-    // Curves of one error that spend one kind of time share a chart.
-    let mut kinds: Vec<(String, bool)> = Vec::new();
-    for curve in &curves {
-        let kind = (text(&curve["main"]), is_instruments(curve));
-        if !kinds.contains(&kind) {
-            kinds.push(kind);
-        }
-    }
-    let chart = |(main, instrument): &(String, bool)| {
-        let svg = against_time(found, &curves, main, *instrument)?;
-        let whose = if *instrument { "the simulated instrument" } else { "the computer" };
-        Some((format!("{main} against the time of {whose}; bars are 95 % intervals."), svg))
-    };
-    let slopes = curves.iter().flat_map(|c| {
-        let of_law = c["slopes"].as_array().into_iter().flatten().filter(|s| s["law"].is_object());
-        of_law.map(|s| slope(&text(&c["name"]), s))
-    });
+fn sweep(found: &views::Sweep) -> Sweep {
+    let chart = |plot: views::SweepPlot| (format!("{}; bars are 95 % intervals.", plot.shows), plot.figure.inline());
+    let slopes = found.curves.iter().flat_map(|c| c.slopes.iter().filter_map(|s| slope(&c.name, s)));
     Sweep {
-        title: format!("{}: {}", text(&found["stage"]), text(&found["subject"])),
-        charts: kinds.iter().filter_map(chart).collect(),
+        title: format!("{}: {}", found.stage, found.subject),
+        charts: found.against_time().into_iter().map(chart).collect(),
         slopes: slopes.collect(),
     }
 }
 
-fn is_instruments(curve: &Value) -> bool {
-    curve["cost"] == "instrument"
-}
-
-/// The curves whose main error this is, over their time.
-fn against_time(found: &Value, curves: &[&Value], main: &str, instrument: bool) -> Option<String> {
-    let measure = found["measures"].as_array()?.iter().position(|m| m["name"] == main)?;
-    let point = |p: &Value| {
-        let error = &p["errors"][measure];
-        let bar = error["low"].as_f64().zip(error["high"].as_f64()).filter(|(low, high)| *low > 0.0 && high > low);
-        let seconds = if instrument { &p["instrument_s"] } else { &p["seconds"]["value"] };
-        Some(Point { x: seconds.as_f64()?, y: error["value"].as_f64()?, bar })
-    };
-    let of = |(color, curve): (usize, &&Value)| Series {
-        name: curve["name"].as_str().unwrap_or_default().into(),
-        marks: Marks::Both,
-        points: curve["points"].as_array().into_iter().flatten().filter_map(point).collect(),
-        color,
-    };
-    let shown = curves.iter().filter(|c| c["main"] == main && is_instruments(c) == instrument);
-    let chart = LogLog {
-        title: format!("{main} against time"),
-        x_label: "time [s]".into(),
-        y_label: main.into(),
-        series: shown.enumerate().map(of).collect(),
-        ..LogLog::default()
-    };
-    chart.series.iter().any(|s| s.points.len() > 1).then(|| chart.figure().inline())
-}
-
-fn slope(curve: &str, found: &Value) -> SlopeRow {
-    let of = |v: &Value| v.as_f64().map(|x| minus(&format!("{x:.3}")));
-    let theory = of(&found["law"]["theory"]["slope"]).unwrap_or_else(|| "–".into());
-    let steeper = if found["law"]["theory"]["kind"] == "at-most" { " or steeper" } else { "" };
-    let ends = of(&found["slope"]["low"]).zip(of(&found["slope"]["high"]));
-    SlopeRow {
+/// A slope that theory knows.
+fn slope(curve: &str, found: &SweepSlope) -> Option<SlopeRow> {
+    let told = |x: f64| minus(&format!("{x:.3}"));
+    let law = found.law.as_ref()?;
+    let (theory, may_be_steeper) = law.slope();
+    let ends = found.slope.low.zip(found.slope.high);
+    let unknown = || "–".to_owned();
+    Some(SlopeRow {
         curve: curve.into(),
-        measure: found["measure"].as_str().unwrap_or_default().into(),
-        slope: of(&found["slope"]["value"]).unwrap_or_else(|| "–".into()),
-        interval: ends.map_or_else(|| "–".into(), |(low, high)| format!("{low} to {high}")),
-        theory: theory + steeper,
-        why: found["law"]["why"].as_str().unwrap_or_default().into(),
-    }
+        measure: found.measure.clone(),
+        slope: found.slope.value.map_or_else(unknown, told),
+        interval: ends.map_or_else(unknown, |(low, high)| format!("{} to {}", told(low), told(high))),
+        theory: told(theory) + if may_be_steeper { " or steeper" } else { "" },
+        why: law.why.clone(),
+    })
 }

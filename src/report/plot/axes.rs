@@ -5,11 +5,19 @@ use super::scale::Scale;
 
 /// An axis: its label, with the unit, and its scale.
 #[derive(Debug, Clone)]
-pub(in crate::report) struct Axis<'a> {
-    pub label: &'a str,
+pub struct Axis {
+    /// The label.
+    pub label: String,
+    /// The scale.
     pub scale: Scale,
-    /// About how many labels it has room for.
-    pub labels: usize,
+}
+
+impl Axis {
+    /// An axis of this label and scale.
+    #[must_use]
+    pub fn new(label: impl Into<String>, scale: Scale) -> Self {
+        Self { label: label.into(), scale }
+    }
 }
 
 /// Where a plot's data are drawn, CSS pixels.
@@ -48,10 +56,10 @@ impl Area {
         format!("{} {} {} {}", self.left, self.top, self.width, self.height)
     }
 
-    /// Grid, axes, marks and labels; the label of y stands above its axis, where it reads without turning the head.
-    pub fn frame(&self, canvas: &mut Canvas, x: &Axis<'_>, y: &Axis<'_>, grid: bool) {
+    /// Grid, axes, about so many marks with labels; the label of y stands above its axis, where it reads without turning the head.
+    pub fn frame(&self, canvas: &mut Canvas, (x, x_labels): (&Axis, usize), (y, y_labels): (&Axis, usize), grid: bool) {
         canvas.group("frame", |c| {
-            for tick in x.scale.ticks(x.labels) {
+            for tick in x.scale.ticks(x_labels) {
                 let Some(at) = x.scale.place(tick.value).map(|p| self.x(p)) else { continue };
                 if grid && !tick.label.is_empty() {
                     c.segment("grid", (at, self.top), (at, self.bottom()));
@@ -60,7 +68,7 @@ impl Area {
                 c.segment("axis", (at, self.bottom()), (at, self.bottom() + length));
                 c.text("tick middle", (at, self.bottom() + 18.0), &tick.label);
             }
-            for tick in y.scale.ticks(y.labels) {
+            for tick in y.scale.ticks(y_labels) {
                 let Some(at) = y.scale.place(tick.value).map(|p| self.y(p)) else { continue };
                 if grid && !tick.label.is_empty() {
                     c.segment("grid", (self.left, at), (self.right(), at));
@@ -71,8 +79,8 @@ impl Area {
             }
             let corner = [(self.left, self.top), (self.left, self.bottom()), (self.right(), self.bottom())];
             c.path("axis", super::canvas::line(corner));
-            c.text("middle", (self.left + 0.5 * self.width, self.bottom() + 36.0), x.label);
-            c.text("", (self.left - 8.0 - 36.0, self.top - 12.0), y.label);
+            c.text("middle", (self.left + 0.5 * self.width, self.bottom() + 36.0), &x.label);
+            c.text("", (self.left - 8.0 - 36.0, self.top - 12.0), &y.label);
         });
     }
 }

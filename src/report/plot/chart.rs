@@ -3,6 +3,7 @@
 use super::Figure;
 use super::axes::{Area, Axis};
 use super::canvas::{Canvas, line};
+use super::heading::Heading;
 use super::legend::{dot_class, draw_legend, legend_rows, line_class, wrapped};
 use super::scale::Scale;
 
@@ -63,20 +64,12 @@ pub enum LegendPlace {
 /// A chart.
 #[derive(Debug, Clone)]
 pub struct Chart {
-    /// What it shows, for its title and for those who can't see it.
-    pub title: String,
-    /// More of that, read out where it is asked for.
-    pub description: String,
-    /// Whether the title is drawn; a page has its own captions.
-    pub titled: bool,
-    /// Label of the horizontal axis, with its unit.
-    pub x_label: String,
-    /// Label of the vertical axis, with its unit.
-    pub y_label: String,
-    /// The horizontal scale.
-    pub x: Scale,
-    /// The vertical scale.
-    pub y: Scale,
+    /// What it shows.
+    pub heading: Heading,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
     /// What is drawn.
     pub series: Vec<Series>,
     /// Whether error bars are drawn.
@@ -90,13 +83,9 @@ pub struct Chart {
 impl Default for Chart {
     fn default() -> Self {
         Self {
-            title: String::new(),
-            description: String::new(),
-            titled: false,
-            x_label: String::new(),
-            y_label: String::new(),
-            x: Scale::linear(0.0, 1.0),
-            y: Scale::linear(0.0, 1.0),
+            heading: Heading::default(),
+            x: Axis::new("", Scale::linear(0.0, 1.0)),
+            y: Axis::new("", Scale::linear(0.0, 1.0)),
             series: Vec::new(),
             bars: true,
             legend: LegendPlace::Below,
@@ -110,23 +99,19 @@ impl Chart {
     #[must_use]
     pub fn figure(&self) -> Figure {
         let (width, height) = self.size;
-        let top = if self.titled { 52.0 } else { 30.0 };
+        let top = self.heading.top();
         let area = Area { left: 54.0, top, width: width - 54.0 - 16.0, height: height - top - 46.0 };
         let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), s.marks, s.color)).collect();
         let rows = if self.legend == LegendPlace::Below { legend_rows(&names, width - 20.0) } else { Vec::new() };
-        let mut canvas = Canvas::new(width, height + 18.0 * rows.len() as f64);
-        if self.titled {
-            canvas.text("head", (10.0, 20.0), &self.title);
-        }
-        let axis = |label, scale, labels| Axis { label, scale, labels };
-        let across = (area.width / 64.0) as usize;
-        area.frame(&mut canvas, &axis(&self.x_label, self.x, across), &axis(&self.y_label, self.y, 6), true);
+        let mut canvas = self.heading.canvas(width, height + 18.0 * rows.len() as f64);
+        area.frame(&mut canvas, (&self.x, (area.width / 64.0) as usize), (&self.y, 6), true);
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, &area, s)));
         draw_legend(&mut canvas, &rows, 10.0, height + 8.0);
-        Figure::new(canvas, &self.title, &self.description)
+        self.heading
+            .figure(canvas)
             .with_data("area", area.data())
-            .with_data("x", self.x.data())
-            .with_data("y", self.y.data())
+            .with_data("x", self.x.scale.data())
+            .with_data("y", self.y.scale.data())
     }
 
     fn draw(&self, canvas: &mut Canvas, area: &Area, series: &Series) {
@@ -146,7 +131,7 @@ impl Chart {
     }
 
     fn inside(&self, area: &Area, p: &Point) -> Option<(f64, f64)> {
-        let (x, y) = (self.x.place(p.x)?, self.y.place(p.y)?);
+        let (x, y) = (self.x.scale.place(p.x)?, self.y.scale.place(p.y)?);
         let is_inside = |place: f64| (-1e-6..=1.0 + 1e-6).contains(&place);
         (is_inside(x) && is_inside(y)).then(|| (area.x(x), area.y(y)))
     }
@@ -156,7 +141,7 @@ impl Chart {
         let mut pieces = vec![Vec::new()];
         let mut last: Option<(f64, f64)> = None;
         for p in points {
-            let place = self.x.place(p.x).zip(self.y.place(p.y));
+            let place = self.x.scale.place(p.x).zip(self.y.scale.place(p.y));
             if let (Some(from), Some(to)) = (last, place)
                 && let Some((a, b)) = clipped(from, to)
             {
@@ -183,7 +168,7 @@ impl Chart {
     fn bar(&self, area: &Area, p: &Point) -> Option<String> {
         let (x, _) = self.inside(area, p)?;
         let (low, high) = p.bar?;
-        let end = |v: f64, or: f64| area.y(self.y.place(v).unwrap_or(or).clamp(0.0, 1.0));
+        let end = |v: f64, or: f64| area.y(self.y.scale.place(v).unwrap_or(or).clamp(0.0, 1.0));
         Some(line([(x, end(low, 0.0)), (x, end(high, 1.0))]))
     }
 }
@@ -232,7 +217,11 @@ mod tests {
     #[test]
     fn names_are_escaped() {
         let series = Series { name: "<b>&\"x".into(), marks: Marks::Line, points: vec![], color: 1 };
-        let chart = Chart { title: "<script>".into(), series: vec![series], ..Chart::default() };
+        let chart = Chart {
+            heading: Heading { title: "<script>".into(), ..Heading::default() },
+            series: vec![series],
+            ..Chart::default()
+        };
         let svg = chart.figure().to_svg();
         assert!(!svg.contains("<script>") && !svg.contains("<b>"), "{svg}");
         assert!(svg.contains("&#60;b&#62;&#38;&#34;x") || svg.contains("&lt;b&gt;&amp;&quot;x"), "{svg}");

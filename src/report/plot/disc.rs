@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use super::Figure;
 use super::canvas::{Canvas, Mark, short};
+use super::heading::Heading;
 use super::heat::{color_bar, hex};
 use super::scale::Scale;
 use crate::image::ColorMap;
@@ -24,11 +25,7 @@ pub struct DiscCell {
 #[derive(Debug, Clone)]
 pub struct Disc {
     /// What it shows.
-    pub title: String,
-    /// More of that.
-    pub description: String,
-    /// Whether the title is drawn.
-    pub titled: bool,
+    pub heading: Heading,
     /// The cells that there is something to show of.
     pub cells: Vec<DiscCell>,
     /// What the colours stand for.
@@ -45,13 +42,10 @@ impl Disc {
     /// The drawing.
     #[must_use]
     pub fn figure(&self) -> Figure {
-        let top = if self.titled { 52.0 } else { 30.0 };
+        let top = self.heading.top();
         let radius = 0.5 * (self.width - 36.0 - 110.0);
         let center = (36.0 + radius, top + radius);
-        let mut canvas = Canvas::new(self.width, top + 2.0 * radius + 30.0);
-        if self.titled {
-            canvas.text("head", (10.0, 20.0), &self.title);
-        }
+        let mut canvas = self.heading.canvas(self.width, top + 2.0 * radius + 30.0);
         let layers = self.cells.iter().map(|cell| (self.color(cell.value), outline(center, radius, cell)));
         canvas.marks.push(Mark::Cells { layers: layers.collect() });
         frame(&mut canvas, center, radius);
@@ -61,8 +55,7 @@ impl Disc {
         }
         let bar = (center.0 + radius + 30.0, top, 2.0 * radius);
         color_bar(&mut canvas, ColorMap::Sequential, self.scale, &self.color_label, bar);
-        Figure::new(canvas, &self.title, &self.description)
-            .with_data("disc", format!("{} {} {radius}", center.0, center.1))
+        self.heading.figure(canvas).with_data("disc", format!("{} {} {radius}", center.0, center.1))
     }
 
     fn color(&self, value: f64) -> String {

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::Figure;
 use super::axes::{Area, Axis};
 use super::canvas::{Canvas, Mark, short};
+use super::heading::Heading;
 use super::scale::Scale;
 use crate::image::ColorMap;
 
@@ -12,19 +13,11 @@ use crate::image::ColorMap;
 #[derive(Debug, Clone)]
 pub struct HeatMap {
     /// What it shows.
-    pub title: String,
-    /// More of that.
-    pub description: String,
-    /// Whether the title is drawn.
-    pub titled: bool,
-    /// Label of the horizontal axis, with its unit.
-    pub x_label: String,
-    /// Label of the vertical axis.
-    pub y_label: String,
-    /// The horizontal scale.
-    pub x: Scale,
-    /// The vertical scale.
-    pub y: Scale,
+    pub heading: Heading,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
     /// Borders of the columns, rising.
     pub x_borders: Vec<f64>,
     /// Borders of the rows, rising.
@@ -48,19 +41,14 @@ impl HeatMap {
     /// The drawing; its area is square.
     #[must_use]
     pub fn figure(&self) -> Figure {
-        let top = if self.titled { 52.0 } else { 30.0 };
+        let top = self.heading.top();
         let side = self.width - 54.0 - 92.0;
         let area = Area { left: 54.0, top, width: side, height: side };
-        let mut canvas = Canvas::new(self.width, top + side + 46.0);
-        if self.titled {
-            canvas.text("head", (10.0, 20.0), &self.title);
-        }
+        let mut canvas = self.heading.canvas(self.width, top + side + 46.0);
         canvas.marks.push(Mark::Cells { layers: self.layers(&area) });
-        let x = Axis { label: &self.x_label, scale: self.x, labels: 4 };
-        let y = Axis { label: &self.y_label, scale: self.y, labels: 5 };
-        area.frame(&mut canvas, &x, &y, false);
+        area.frame(&mut canvas, (&self.x, 4), (&self.y, 5), false);
         self.bar(&mut canvas, &area);
-        Figure::new(canvas, &self.title, &self.description).with_data("area", area.data())
+        self.heading.figure(canvas).with_data("area", area.data())
     }
 
     fn level(&self, value: f64) -> usize {
@@ -71,8 +59,8 @@ impl HeatMap {
     /// One path a colour, runs of cells of a row as one rectangle.
     fn layers(&self, area: &Area) -> Vec<(String, String)> {
         let columns = self.x_borders.len().max(2) - 1;
-        let x: Vec<f64> = self.x_borders.iter().filter_map(|b| self.x.place(*b).map(|p| area.x(p))).collect();
-        let y: Vec<f64> = self.y_borders.iter().filter_map(|b| self.y.place(*b).map(|p| area.y(p))).collect();
+        let x: Vec<f64> = self.x_borders.iter().filter_map(|b| self.x.scale.place(*b).map(|p| area.x(p))).collect();
+        let y: Vec<f64> = self.y_borders.iter().filter_map(|b| self.y.scale.place(*b).map(|p| area.y(p))).collect();
         let mut paths = vec![String::new(); LEVELS];
         for (row, values) in self.values.chunks(columns).enumerate() {
             let levels: Vec<Option<usize>> =
@@ -140,13 +128,9 @@ mod tests {
     #[test]
     fn runs_are_joined_and_gaps_left_empty() {
         let map = HeatMap {
-            title: String::new(),
-            description: String::new(),
-            titled: false,
-            x_label: String::new(),
-            y_label: String::new(),
-            x: Scale::linear(0.0, 1.0),
-            y: Scale::linear(0.0, 1.0),
+            heading: Heading::default(),
+            x: Axis::new("", Scale::linear(0.0, 1.0)),
+            y: Axis::new("", Scale::linear(0.0, 1.0)),
             x_borders: vec![0.0, 0.5, 0.75, 1.0],
             y_borders: vec![0.0, 0.5, 1.0],
             values: vec![Some(1.0), Some(1.0), None, Some(f64::NAN), Some(-1.0), Some(1.0)],

@@ -1,7 +1,9 @@
 //! Error against cost over two logarithmic axes, with the slopes that theory expects.
 
 use super::Figure;
+use super::axes::Axis;
 use super::chart::{Chart, Marks, Point, Series};
+use super::heading::Heading;
 use super::scale::Scale;
 
 /// A reference line of known slope.
@@ -19,7 +21,7 @@ pub struct Slope {
 #[derive(Debug, Clone, Default)]
 pub struct LogLog {
     /// What it shows.
-    pub title: String,
+    pub heading: Heading,
     /// Label of the horizontal axis, `time [s]` say.
     pub x_label: String,
     /// Label of the vertical axis.
@@ -28,8 +30,6 @@ pub struct LogLog {
     pub series: Vec<Series>,
     /// Reference lines.
     pub slopes: Vec<Slope>,
-    /// Whether the title is drawn.
-    pub titled: bool,
 }
 
 impl LogLog {
@@ -46,12 +46,9 @@ impl LogLog {
         let y = Scale::log_around(ends, 12.0);
         let references: Vec<Series> = self.slopes.iter().filter_map(|s| reference(s, &series, x)).collect();
         let mut chart = Chart {
-            title: self.title.clone(),
-            titled: self.titled,
-            x_label: self.x_label.clone(),
-            y_label: self.y_label.clone(),
-            x,
-            y,
+            heading: self.heading.clone(),
+            x: Axis::new(&*self.x_label, x),
+            y: Axis::new(&*self.y_label, y),
             series,
             ..Chart::default()
         };

@@ -8,6 +8,7 @@ mod axes;
 mod canvas;
 mod chart;
 mod disc;
+mod heading;
 mod heat;
 mod legend;
 mod loglog;
@@ -16,8 +17,10 @@ mod raster;
 mod scale;
 mod style;
 
+pub use axes::Axis;
 pub use chart::{Chart, LegendPlace, Marks, Point, Series};
 pub use disc::{Disc, DiscCell};
+pub use heading::Heading;
 pub use heat::HeatMap;
 pub(in crate::report) use heat::hex;
 pub(in crate::report) use legend::{dot_class, line_class};

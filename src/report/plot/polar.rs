@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use super::Figure;
 use super::canvas::{Canvas, Mark, Px, line, short};
 use super::chart::{Marks, Series};
+use super::heading::Heading;
 use super::legend::{dot_class, draw_legend, legend_rows, line_class};
 use super::scale::Scale;
 
@@ -12,11 +13,7 @@ use super::scale::Scale;
 #[derive(Debug, Clone)]
 pub struct PolarChart {
     /// What it shows.
-    pub title: String,
-    /// More of that.
-    pub description: String,
-    /// Whether the title is drawn.
-    pub titled: bool,
+    pub heading: Heading,
     /// What the length of a ray is, with its unit.
     pub label: String,
     /// Lengths; a logarithmic one begins at the centre with its low end.
@@ -38,22 +35,20 @@ impl PolarChart {
     #[must_use]
     pub fn figure(&self) -> Figure {
         let radius = 0.5 * self.width - MARGIN;
-        let top = if self.titled { 46.0 } else { 26.0 };
+        let top = if self.heading.drawn { 46.0 } else { 26.0 };
         let center = (0.5 * self.width, top + radius);
         let base = center.1 + 46.0;
         let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), s.marks, s.color)).collect();
         let rows = if self.legend { legend_rows(&names, self.width - 20.0) } else { Vec::new() };
-        let mut canvas = Canvas::new(self.width, base + 6.0 + 18.0 * rows.len() as f64);
-        if self.titled {
-            canvas.text("head", (10.0, 18.0), &self.title);
-        }
+        let mut canvas = self.heading.canvas(self.width, base + 6.0 + 18.0 * rows.len() as f64);
         self.frame(&mut canvas, center, radius);
         if let Some(angle) = self.incidence_deg {
             incident(&mut canvas, center, radius, angle);
         }
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, center, radius, s)));
         draw_legend(&mut canvas, &rows, 10.0, base + 12.0);
-        Figure::new(canvas, &self.title, &self.description)
+        self.heading
+            .figure(canvas)
             .with_data("polar", format!("{} {} {radius}", center.0, center.1))
             .with_data("r", self.scale.data())
     }

@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{EFFECTS, Kind, ReportError, Run, RunFit, RunOptions, SWEEP, Table, json, left_out};
+use super::{EFFECTS, Kind, Made, ReportError, Run, RunFit, RunOptions, SWEEP, Table, compared, json, left_out};
 use crate::brdf::Material;
-use crate::report::views::Predicted;
 
 /// Names that a measurement beside its fits may have.
 const MEASUREMENTS: [&str; 2] = ["csv", "binary"];
@@ -12,7 +11,8 @@ const MEASUREMENTS: [&str; 2] = ["csv", "binary"];
 const OTHERS: [&str; 2] = [EFFECTS, SWEEP];
 
 pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportError> {
-    let (fits, mut refused) = fits(folder)?;
+    let mut notes = Vec::new();
+    let (fits, mut refused) = fits(folder, &mut notes)?;
     if fits.is_empty() {
         let nothing = ReportError::Nothing { path: folder.into() };
         return Err(if refused.is_empty() { nothing } else { refused.swap_remove(0) });
@@ -28,13 +28,13 @@ pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportErr
         title: title.unwrap_or_else(|| "fits".into()),
         table,
         fits,
-        notes: refused.iter().map(|error| left_out(&error.to_string())).collect(),
+        notes: refused.iter().map(|error| left_out(&error.to_string())).chain(notes).collect(),
         ..Run::empty()
     })
 }
 
 /// Every material in the folder, by name, and what can't be read.
-fn fits(folder: &Path) -> Result<(Vec<RunFit>, Vec<ReportError>), ReportError> {
+fn fits(folder: &Path, notes: &mut Vec<String>) -> Result<(Vec<RunFit>, Vec<ReportError>), ReportError> {
     let is_fit = |p: &PathBuf| p.extension().is_some_and(|e| e == "json") && !OTHERS.iter().any(|o| p.ends_with(o));
     let (mut found, mut refused) = (Vec::new(), Vec::new());
     for path in files(folder)?.into_iter().filter(is_fit) {
@@ -49,7 +49,7 @@ fn fits(folder: &Path) -> Result<(Vec<RunFit>, Vec<ReportError>), ReportError> {
         let Ok(material) = Material::from_json(&value.to_string()) else { continue };
         let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         let file = path.display().to_string();
-        found.push(RunFit { label: stem, file, predicted: Predicted::new(&material, None), image: None });
+        found.push(compared(&material, (&stem, file), None, &Made::default(), notes));
     }
     Ok((found, refused))
 }

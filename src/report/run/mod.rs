@@ -2,7 +2,9 @@
 
 mod demo;
 mod error;
+mod files;
 mod loose;
+mod sight;
 mod table;
 mod validated;
 
@@ -10,11 +12,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-pub(in crate::report) use demo::{DEMO_INSTRUMENT, find as known_instrument};
 pub use error::ReportError;
+use files::{found, json, picture, sweeps};
+pub use sight::fitted_through;
+pub(in crate::report) use sight::known_instrument;
 pub use table::Table;
 
-use super::views::Predicted;
+use super::views::{Predicted, Sweep};
 use crate::brdf::Material;
 use crate::image::Image;
 use crate::measurement::{Measurement, ReadOptions};
@@ -37,8 +41,10 @@ pub struct RunFit {
     pub label: String,
     /// Its file, as one would type it.
     pub file: String,
-    /// The material, and what it is seen through.
+    /// The material, and what it is seen through beside readings.
     pub predicted: Predicted,
+    /// The name of that instrument.
+    pub through: Option<String>,
     /// How its picture differs from the reference's, as `numbers.json` has it; none where there is no such picture.
     pub image: Option<Value>,
 }
@@ -88,8 +94,10 @@ pub struct Run {
     pub truth: Option<Predicted>,
     /// The fits.
     pub fits: Vec<RunFit>,
-    /// Pictures, the one that others are compared with first.
+    /// Pictures, the one that others are compared with first, if it can be read.
     pub pictures: Vec<Picture>,
+    /// What that one shows.
+    pub reference: String,
     /// Exposure of the previews, stops.
     pub exposure: Option<f64>,
     /// Time of each stage, s.
@@ -107,7 +115,7 @@ pub struct Run {
     /// What `goniofit effects --json` found, where its output lies in the folder as `effects.json`.
     pub effects: Option<Value>,
     /// What `goniofit tradeoff` measured: every `tradeoff.json` in the folder, or in a folder within it.
-    pub sweeps: Vec<Value>,
+    pub sweeps: Vec<Sweep>,
 }
 
 /// What `numbers.json` does not say.
@@ -134,7 +142,7 @@ impl Run {
             if numbers.get("truth").is_some() {
                 demo::read(folder, &numbers, options)?
             } else if numbers.get("reference").is_some() {
-                validated::read(folder, &numbers, options)?
+                validated::read(folder, &numbers, options)
             } else {
                 return Err(ReportError::Numbers { path });
             }
@@ -149,19 +157,20 @@ impl Run {
     fn add_extras(&mut self) {
         let effects = self.folder.join(EFFECTS);
         if effects.is_file() {
-            self.effects = self.extra(&effects, "effects");
+            let known = |value: Value| if value["effects"].is_array() { Ok(value) } else { Err("no list `effects`") };
+            self.effects = self.extra(&effects, known);
         }
         for path in sweeps(&self.folder) {
-            let sweep = self.extra(&path, "curves");
+            let sweep = self.extra(&path, serde_json::from_value::<Sweep>);
             self.sweeps.extend(sweep);
         }
     }
 
-    /// An object with a list of this name.
-    fn extra(&mut self, path: &Path, list: &str) -> Option<Value> {
-        let reason = match json(path) {
-            Ok(value) if value[list].is_array() => return Some(value),
-            Ok(_) => format!("{}: expected an object with the list `{list}`, found none", path.display()),
+    /// What `understood` makes of a file's JSON.
+    fn extra<T, E: std::fmt::Display>(&mut self, path: &Path, understood: impl Fn(Value) -> Result<T, E>) -> Option<T> {
+        let reason = match json(path).map(understood) {
+            Ok(Ok(found)) => return Some(found),
+            Ok(Err(error)) => format!("{}: expected what goniofit wrote there, found {error}", path.display()),
             Err(error) => error.to_string(),
         };
         self.notes.push(left_out(&reason));
@@ -175,9 +184,10 @@ impl Run {
         measurement: Measurement,
         file: &str,
         material: &Material,
-        through: Through,
+        through: Option<(String, Through)>,
         made: Made,
     ) -> Self {
+        let (name, sight) = through.map_or((None, None), |(name, sight)| (Some(name), sight));
         let label = material.model();
         let table = Table::new(path, measurement);
         Self {
@@ -185,10 +195,21 @@ impl Run {
             folder: path.parent().map(Path::to_path_buf).unwrap_or_default(),
             title: table.measurement.name.clone(),
             table: Ok(table),
-            fits: vec![RunFit { label, file: file.into(), predicted: Predicted::new(material, through), image: None }],
+            fits: vec![RunFit {
+                label,
+                file: file.into(),
+                predicted: Predicted::new(material, sight),
+                through: name,
+                image: None,
+            }],
             made,
             ..Self::empty()
         }
+    }
+
+    /// Where files that the run names may lie.
+    pub(in crate::report) fn folders(&self) -> Vec<&Path> {
+        self.made.folder.as_deref().into_iter().chain([Path::new(""), &self.folder]).collect()
     }
 
     pub(in crate::report) fn empty() -> Self {
@@ -200,6 +221,7 @@ impl Run {
             truth: None,
             fits: Vec::new(),
             pictures: Vec::new(),
+            reference: String::new(),
             exposure: None,
             times: Vec::new(),
             instrument: None,
@@ -225,12 +247,6 @@ fn left_out(reason: &str) -> String {
 /// What lobes are seen through.
 pub type Through = Option<std::sync::Arc<dyn crate::brdf::Sight>>;
 
-/// The JSON in a file.
-fn json(path: &Path) -> Result<Value, ReportError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ReportError::Io { path: path.into(), source })?;
-    serde_json::from_str(&text).map_err(|source| ReportError::Json { path: path.into(), source })
-}
-
 impl Made {
     /// As `run` in `numbers.json` says it.
     #[must_use]
@@ -244,53 +260,31 @@ impl Made {
     }
 }
 
-/// A file that was named in another folder than this: as it is, from the run's folder, beside the results.
-fn found(name: &str, made: &Made, folder: &Path) -> PathBuf {
-    let path = PathBuf::from(name);
-    let there = made.folder.iter().map(|f| f.join(&path));
-    let beside = path.file_name().map(|f| folder.join(f));
-    let places = there.chain([path.clone()]).chain(beside);
-    places.into_iter().find(|p| p.is_file()).unwrap_or(path)
-}
-
-/// A picture of the folder, if it is there.
-fn picture(folder: &Path, file: &str, label: &str) -> Result<Option<Picture>, ReportError> {
-    let path = folder.join(file);
-    if !path.is_file() {
-        return Ok(None);
-    }
-    let image = crate::image::read_exr(&path).map_err(crate::chain::ChainError::from)?;
-    Ok(Some(Picture { label: label.into(), file: file.into(), image }))
-}
-
-/// Where sweeps lie, by name.
-fn sweeps(folder: &Path) -> Vec<PathBuf> {
-    // A folder that does not tell what is in it may hold the run all the same.
-    let entries = std::fs::read_dir(folder).into_iter().flatten();
-    let within = entries.filter_map(Result::ok).map(|e| e.path().join(SWEEP));
-    let mut found: Vec<PathBuf> = within.chain([folder.join(SWEEP)]).filter(|p| p.is_file()).collect();
-    found.sort();
-    found
+/// A fit as it is compared with the run's readings: through the instrument that it was made through, where that is known; else a note says that it is not.
+fn compared(
+    material: &Material,
+    (label, file): (&str, String),
+    otherwise: Option<&str>,
+    made: &Made,
+    notes: &mut Vec<String>,
+) -> RunFit {
+    let beside = Path::new(&file).parent().unwrap_or(Path::new(""));
+    let folders: Vec<&Path> = made.folder.as_deref().into_iter().chain([Path::new(""), beside]).collect();
+    let (through, sight) = match fitted_through(material, otherwise, &folders) {
+        Ok(seen) => seen.map_or((None, None), |(name, sight)| (Some(name), sight)),
+        Err(unknown) => {
+            notes.push(format!(
+                "{label} was fitted through {unknown}. Here it is drawn as the surface, while the table is what the instrument saw: about sharp \
+                 highlights part of their difference is the instrument's own blur."
+            ));
+            (None, None)
+        }
+    };
+    RunFit { label: label.into(), file, predicted: Predicted::new(material, sight), through, image: None }
 }
 
 /// The note on a run that was ended early.
 fn stopped(numbers: &Value) -> Option<String> {
     let is_stopped = numbers["stopped"] == true;
     is_stopped.then(|| "The run was stopped early: pictures are missing or have fewer samples than asked for.".into())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn files_are_found_where_the_run_was_made_or_beside_its_results() {
-        let (there, results) = (tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder"));
-        let made = Made { folder: Some(there.path().into()), ..Made::default() };
-        assert_eq!(found("lab.csv", &made, results.path()), PathBuf::from("lab.csv"), "nowhere: as it was typed");
-        std::fs::write(results.path().join("lab.csv"), "x").expect("writes");
-        assert_eq!(found("data/lab.csv", &made, results.path()), results.path().join("lab.csv"));
-        std::fs::write(there.path().join("lab.csv"), "x").expect("writes");
-        assert_eq!(found("lab.csv", &made, results.path()), there.path().join("lab.csv"));
-    }
 }

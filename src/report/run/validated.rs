@@ -4,22 +4,21 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{Kind, Made, ReportError, Run, RunFit, RunOptions, Table, found, picture, stopped};
+use super::{Kind, Made, Run, RunFit, RunOptions, Table, compared, found, picture, stopped};
 use crate::chain::load_material;
-use crate::report::views::Predicted;
 
-pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Result<Run, ReportError> {
+pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Run {
     let made = Made::of(&numbers["run"]);
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let typed = text(&numbers["measurement"]);
     let path = options.measurement.clone().unwrap_or_else(|| found(&typed, &made, folder));
     let reference = text(&numbers["reference"]);
     let of_table = reference == "table.exr";
+    let mut notes: Vec<String> = stopped(numbers).into_iter().collect();
     let mut pictures = Vec::new();
     if of_table {
-        pictures.extend(picture(folder, &reference, "table")?);
+        pictures.extend(picture(folder, &reference, "table", &mut notes));
     }
-    let mut notes: Vec<String> = stopped(numbers).into_iter().collect();
     if let Some(reason) = numbers["table_not_rendered"].as_str() {
         notes.push(format!(
             "The table itself could not be rendered ({reason}); pictures are of the fits, each compared with the first."
@@ -27,20 +26,18 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Resu
     }
     let entries: Vec<&Value> = numbers["fits"].as_array().into_iter().flatten().collect();
     let models: Vec<String> = entries.iter().map(|e| text(&e["model"])).collect();
+    let first = entries.first().map(|e| label(&text(&e["fit"]), &models[0], &models)).unwrap_or_default();
     let mut fits = Vec::new();
     for (entry, model) in entries.iter().zip(&models) {
         let name = text(&entry["fit"]);
         let label = label(&name, model, &models);
-        pictures.extend(picture(folder, &text(&entry["picture"]), &label)?);
+        pictures.extend(picture(folder, &text(&entry["picture"]), &label, &mut notes));
         let file = found(&name, &made, folder);
         match load_material(&file.to_string_lossy()) {
             Ok(material) => {
-                if material.fit.as_ref().is_some_and(|f| f.through.is_some()) {
-                    notes.push(format!("{label} was fitted through an instrument; curves and residuals here take readings at face value."));
-                }
                 let image = (!entry["image"].is_null()).then(|| entry["image"].clone());
-                let predicted = Predicted::new(&material, None);
-                fits.push(RunFit { label, file: file.display().to_string(), predicted, image });
+                let fit = compared(&material, (&label, file.display().to_string()), None, &made, &mut notes);
+                fits.push(RunFit { image, ..fit });
             }
             Err(error) => notes.push(format!("A fit is missing: {error}.")),
         }
@@ -48,20 +45,21 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Resu
     let table = Table::read(&path, &options.reading);
     let stem = || PathBuf::from(&typed).file_stem().map(|s| s.to_string_lossy().into_owned());
     let title = table.as_ref().ok().map(|t| t.measurement.name.clone()).or_else(stem);
-    Ok(Run {
+    Run {
         kind: Kind::Validate,
         folder: folder.into(),
         title: title.unwrap_or_else(|| "validation".into()),
         table,
         fits,
         pictures,
+        reference: if of_table { "table".into() } else { first },
         exposure: numbers["exposure"].as_f64(),
         scene: numbers["scene"].as_str().map(str::to_owned),
         seed: numbers["seed"].as_u64(),
         made,
         notes,
         ..Run::empty()
-    })
+    }
 }
 
 /// A fit's model; its file besides where another has the same.

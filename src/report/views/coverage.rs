@@ -6,7 +6,7 @@ use crate::geometry::grid::cos_difference;
 use crate::geometry::{phi_of, theta_of};
 use crate::measurement::{Dimension, Directions, Measurement};
 use crate::numeric::sum::map_blocks;
-use crate::report::plot::{Disc, DiscCell, Figure, Scale, Spacing};
+use crate::report::plot::{Disc, DiscCell, Figure, Heading, Scale, Spacing};
 
 /// Readings whose detector lay in one cell of the hemisphere, azimuth counted from the light's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,9 +133,11 @@ pub fn masked_figure(coverage: &Coverage, titled: bool) -> Figure {
         value: 100.0 * c.masked as f64 / (c.valid + c.masked) as f64,
     };
     let disc = Disc {
-        title: "Masked values".into(),
-        description: format!("{:.3} % of the values above the horizon are masked.", 100.0 * coverage.masked),
-        titled,
+        heading: Heading {
+            title: "Masked values".into(),
+            description: format!("{:.3} % of the values above the horizon are masked.", 100.0 * coverage.masked),
+            drawn: titled,
+        },
         cells: coverage.cells.iter().filter(|c| c.valid + c.masked > 0).map(cell).collect(),
         scale: Scale::linear(0.0, 100.0),
         color_label: "masked [%]".into(),
@@ -160,12 +162,15 @@ pub fn coverage_figure(coverage: &Coverage, incidences_deg: &[f64], titled: bool
         value: c.valid as f64,
     };
     let disc = Disc {
-        title: "Where the detector stood".into(),
-        description: format!(
-            "Directions seen from above, the light from the left, each cell as large as its solid angle: {:.1} % of the hemisphere has valid readings.",
-            100.0 * coverage.covered
-        ),
-        titled,
+        heading: Heading {
+            title: "Where the detector stood".into(),
+            description: format!(
+                "Directions seen from above, the light from the left, each cell as large as its solid angle: {:.1} % of the hemisphere has valid \
+                 readings.",
+                100.0 * coverage.covered
+            ),
+            drawn: titled,
+        },
         cells: cells.map(cell).collect(),
         scale: Scale { low: least, high: most, spacing: Spacing::Log },
         color_label: "values".into(),

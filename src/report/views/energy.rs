@@ -2,7 +2,7 @@
 
 use crate::brdf::Material;
 use crate::chain::Scatter;
-use crate::report::plot::{Chart, Figure, Marks, Point, Scale, Series};
+use crate::report::plot::{Axis, Chart, Figure, Heading, Marks, Point, Scale, Series};
 
 /// Directional albedo of something, channel by channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,13 +58,13 @@ pub fn energy_figure(curves: &[AlbedoCurve], channel: usize, name: &str, titled:
     let series: Vec<Series> = curves.iter().map(of).collect();
     let largest = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(0.0, f64::max);
     let chart = Chart {
-        title: format!("Reflected share, {name}"),
-        description: format!("Directional albedo over the angle of incidence; the largest is {largest:.3}."),
-        titled,
-        x_label: "θi [°]".into(),
-        y_label: "directional albedo".into(),
-        x: Scale::degrees(0.0, 90.0),
-        y: Scale::around(series.iter().flat_map(|s| &s.points).map(|p| p.y)),
+        heading: Heading {
+            title: format!("Reflected share, {name}"),
+            description: format!("Directional albedo over the angle of incidence; the largest is {largest:.3}."),
+            drawn: titled,
+        },
+        x: Axis::new("θi [°]", Scale::degrees(0.0, 90.0)),
+        y: Axis::new("directional albedo", Scale::around(series.iter().flat_map(|s| &s.points).map(|p| p.y))),
         series,
         size: (430.0, 290.0),
         ..Chart::default()

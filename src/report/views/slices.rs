@@ -4,12 +4,13 @@
 
 use glam::{DVec2, DVec3};
 
-use super::Predicted;
+use super::{Peak, Predicted, peak};
 use crate::brdf::Brdf;
 use crate::geometry::angles::direction_deg;
 use crate::geometry::theta_of;
 use crate::measurement::{Dimension, Directions, Measurement, TableBrdf};
-use crate::report::plot::{Chart, Figure, LegendPlace, Marks, Point, PolarChart, Scale, Series};
+use crate::report::plot::{Axis, Chart, Figure, Heading, LegendPlace, Marks, Point, PolarChart, Scale, Series};
+use crate::report::words::number;
 
 /// How far a reading may lie out of the plane, and off the incidence asked for, as a direction cosine: about 0.06°.
 const TOLERANCE: f64 = 1e-3;
@@ -176,13 +177,9 @@ pub fn scale_of(slices: &[Slice], channel: usize, log: bool) -> Scale {
 #[must_use]
 pub fn slice_figure(slice: &Slice, channel: usize, name: &str, y: Scale, unit: &str, titled: bool) -> Figure {
     let chart = Chart {
-        title: title(slice, name),
-        description: describe(slice, channel, unit),
-        titled,
-        x_label: "θo [°], positive on the mirror side".into(),
-        y_label: format!("BRDF [{unit}]"),
-        x: Scale::degrees(-90.0, 90.0),
-        y,
+        heading: heading(slice, (channel, name), unit, titled),
+        x: Axis::new("θo [°], positive on the mirror side", Scale::degrees(-90.0, 90.0)),
+        y: Axis::new(format!("BRDF [{unit}]"), y),
         series: series(slice, channel),
         legend: LegendPlace::Below,
         ..Chart::default()
@@ -194,9 +191,7 @@ pub fn slice_figure(slice: &Slice, channel: usize, name: &str, y: Scale, unit: &
 #[must_use]
 pub fn polar_figure(slice: &Slice, channel: usize, name: &str, scale: Scale, unit: &str, titled: bool) -> Figure {
     let chart = PolarChart {
-        title: title(slice, name),
-        description: describe(slice, channel, unit),
-        titled,
+        heading: heading(slice, (channel, name), unit, titled),
         label: format!("BRDF [{unit}]"),
         scale,
         series: series(slice, channel),
@@ -207,19 +202,18 @@ pub fn polar_figure(slice: &Slice, channel: usize, name: &str, scale: Scale, uni
     chart.figure()
 }
 
-fn title(slice: &Slice, channel: &str) -> String {
-    format!("θi = {}°, channel {channel}", crate::report::words::number(slice.incidence_deg))
-}
-
-/// What a reader who can't see the figure wants to know: the peak of each curve.
-fn describe(slice: &Slice, channel: usize, unit: &str) -> String {
-    let peak = |curve: &Curve| {
-        let of = curve.theta_o_deg.iter().zip(&curve.values[channel]).filter(|(_, v)| !v.is_nan());
-        let (theta, value) = of.max_by(|a, b| a.1.total_cmp(b.1))?;
-        let number = crate::report::words::number;
-        Some(format!("{}: largest {} {unit} at {}°", curve.name, number(*value), number(*theta)))
+/// Which slice it is, and, for those who can't see the figure, the peak of each curve.
+fn heading(slice: &Slice, (channel, name): (usize, &str), unit: &str, drawn: bool) -> Heading {
+    let largest = |curve: &Curve| {
+        let Peak { value, theta_o_deg, .. } = peak(curve, channel)?;
+        let place = theta_o_deg.map_or_else(String::new, |theta| format!(" at {}°", number(theta)));
+        Some(format!("{}: largest {} {unit}{place}", curve.name, number(value)))
     };
-    slice.curves.iter().filter_map(peak).collect::<Vec<_>>().join("; ")
+    Heading {
+        title: format!("θi = {}°, channel {name}", number(slice.incidence_deg)),
+        description: slice.curves.iter().filter_map(largest).collect::<Vec<_>>().join("; "),
+        drawn,
+    }
 }
 
 fn series(slice: &Slice, channel: usize) -> Vec<Series> {

@@ -2,7 +2,7 @@
 
 use super::{Binned, ResidualMaps, Statistic};
 use crate::image::ColorMap;
-use crate::report::plot::{Figure, HeatMap, Scale};
+use crate::report::plot::{Axis, Figure, Heading, HeatMap, Scale};
 
 /// Where colours of means over their error end: what noise alone reaches in one of millions of cells.
 const NOISE_RANGE: f64 = 5.0;
@@ -42,13 +42,13 @@ pub fn residual_figure(
         Statistic::OverNoise => ("mean residual over its error", ColorMap::Diverging, -range),
     };
     let map = HeatMap {
-        title: format!("{title}, {name}"),
-        description: format!("{name} in {} cells, colours from {} to {}", map.count.len(), low, range),
-        titled,
-        x_label: x_label.into(),
-        y_label: y_label.into(),
-        x,
-        y: Scale::degrees(y0, y1),
+        heading: Heading {
+            title: format!("{title}, {name}"),
+            description: format!("{name} in {} cells, colours from {} to {}", map.count.len(), low, range),
+            drawn: titled,
+        },
+        x: Axis::new(x_label, x),
+        y: Axis::new(y_label, Scale::degrees(y0, y1)),
         x_borders: map.x_deg.clone(),
         y_borders: map.y_deg.clone(),
         values: map.values(statistic),

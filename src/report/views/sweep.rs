@@ -1,0 +1,229 @@
+//! A sweep of `tradeoff`, as its file has it, and its plots: each error against the time, and against its size with the slope of theory beside it.
+
+use serde::Deserialize;
+
+use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope};
+
+/// What `goniofit tradeoff` measured of a stage, as `tradeoff.json` has it; what is neither drawn nor listed is not read.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Sweep {
+    /// `fit`, `render`, `simulate` or `chain`.
+    pub stage: String,
+    /// What was fitted, rendered, measured.
+    pub subject: String,
+    measures: Vec<Measure>,
+    /// The curves.
+    pub curves: Vec<SweepCurve>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Measure {
+    name: String,
+}
+
+/// Settings that differ in one knob.
+#[derive(Debug, Clone, Deserialize)]
+pub struct SweepCurve {
+    /// What they share.
+    pub name: String,
+    #[serde(default)]
+    knob: String,
+    #[serde(default)]
+    axis: String,
+    #[serde(default)]
+    cost: Cost,
+    main: String,
+    points: Vec<Setting>,
+    /// Slopes in log-log.
+    #[serde(default)]
+    pub slopes: Vec<SweepSlope>,
+}
+
+/// Whose time is spent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Cost {
+    #[default]
+    Computer,
+    Instrument,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Setting {
+    size: Option<f64>,
+    seconds: Interval,
+    instrument_s: Option<f64>,
+    errors: Vec<Option<Interval>>,
+}
+
+/// A value with its 95 % interval; an end that is not known is none.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Interval {
+    /// The value.
+    pub value: Option<f64>,
+    /// Lower end.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+}
+
+/// How an error falls with the size.
+#[derive(Debug, Clone, Deserialize)]
+pub struct SweepSlope {
+    /// Which error.
+    pub measure: String,
+    /// d ln error / d ln size.
+    pub slope: Interval,
+    /// What theory says.
+    pub law: Option<Law>,
+}
+
+/// What theory says of a slope, and why.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Law {
+    theory: Theory,
+    /// Why.
+    pub why: String,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind", content = "slope")]
+enum Theory {
+    Exactly(f64),
+    AtMost(f64),
+}
+
+impl Law {
+    /// The exponent, and whether a steeper one is as good.
+    #[must_use]
+    pub fn slope(&self) -> (f64, bool) {
+        match self.theory {
+            Theory::Exactly(slope) => (slope, false),
+            Theory::AtMost(slope) => (slope, true),
+        }
+    }
+}
+
+/// A plot of a sweep.
+#[derive(Debug)]
+pub struct SweepPlot {
+    /// The name of its files: what is drawn, and against what.
+    pub name: String,
+    /// What it shows.
+    pub shows: String,
+    /// The drawing.
+    pub figure: Figure,
+    /// The numbers in it.
+    pub series: Vec<Series>,
+}
+
+impl Sweep {
+    /// All plots that have at least two points on a curve.
+    #[must_use]
+    pub fn plots(&self) -> Vec<SweepPlot> {
+        let mut plots = self.against_time();
+        let mut knobs: Vec<&str> = Vec::new();
+        for curve in self.curves.iter().filter(|c| !c.is_of_effects()) {
+            if !knobs.contains(&curve.knob.as_str()) {
+                knobs.push(&curve.knob);
+            }
+        }
+        plots.extend(knobs.into_iter().flat_map(|knob| self.against_size(knob)));
+        plots
+    }
+
+    /// The main error of all curves against the time that they spend: the computer's, then the instrument's.
+    #[must_use]
+    pub fn against_time(&self) -> Vec<SweepPlot> {
+        let of = |cost: Cost| {
+            let mut mains: Vec<&str> = Vec::new();
+            for curve in self.curves.iter().filter(|c| c.cost == cost) {
+                if !mains.contains(&curve.main.as_str()) {
+                    mains.push(&curve.main);
+                }
+            }
+            mains.into_iter().filter_map(move |main| self.of_time(main, cost))
+        };
+        [Cost::Computer, Cost::Instrument].into_iter().flat_map(of).collect()
+    }
+
+    fn of_time(&self, main: &str, cost: Cost) -> Option<SweepPlot> {
+        let measure = self.measures.iter().position(|m| m.name == main)?;
+        let curves = self.curves.iter().filter(|c| c.cost == cost && c.main == main);
+        let time = |p: &Setting| if cost == Cost::Computer { p.seconds.value } else { p.instrument_s };
+        let series = series(curves.map(|c| (c, c.points(measure, time), c.is_of_effects())));
+        let (whose, name) = match cost {
+            Cost::Computer => ("the computer", format!("{main}-time")),
+            Cost::Instrument => ("the instrument", format!("{main}-instrument-time")),
+        };
+        self.chart(name, &format!("time of {whose} [s]"), main, series, Vec::new())
+    }
+
+    /// Every error of the curves of a knob against its size.
+    fn against_size(&self, knob: &str) -> Vec<SweepPlot> {
+        let curves = || self.curves.iter().filter(move |c| c.knob == knob);
+        let axis = curves().next().map_or("", |c| &c.axis);
+        let of = |(m, measure): (usize, &Measure)| {
+            let series = series(curves().map(|c| (c, c.points(m, |p| p.size), false)));
+            let mut slopes: Vec<Slope> = Vec::new();
+            for (beside, name) in series.iter().map(|s| &s.name).enumerate() {
+                let own = curves().find(|c| c.name == *name).and_then(|c| c.law(&measure.name));
+                let Some((slope, _)) = own.map(Law::slope) else { continue };
+                if !slopes.iter().any(|s| s.slope == slope) {
+                    slopes.push(Slope { name: format!("theory {slope}").replace('-', "−"), slope, beside });
+                }
+            }
+            self.chart(format!("{}-{knob}", measure.name), axis, &measure.name, series, slopes)
+        };
+        self.measures.iter().enumerate().filter_map(of).collect()
+    }
+
+    fn chart(&self, name: String, x: &str, y: &str, series: Vec<Series>, slopes: Vec<Slope>) -> Option<SweepPlot> {
+        if series.iter().all(|s| s.points.len() < 2) {
+            return None;
+        }
+        let title = format!("{} {}: {y} against {x}", self.stage, self.subject);
+        let chart = LogLog {
+            heading: Heading { title, ..Heading::default() },
+            x_label: x.into(),
+            y_label: y.into(),
+            series,
+            slopes,
+        };
+        let shows = format!("{y} against {}", x.trim_end_matches(" [s]"));
+        Some(SweepPlot { name, shows, figure: chart.figure(), series: chart.series })
+    }
+}
+
+impl SweepCurve {
+    /// Whether its settings are effects left out, which no line joins.
+    fn is_of_effects(&self) -> bool {
+        self.knob == "effects"
+    }
+
+    fn law(&self, measure: &str) -> Option<&Law> {
+        self.slopes.iter().find(|s| s.measure == measure).and_then(|s| s.law.as_ref())
+    }
+
+    /// The settings whose error is known to be more than 0.
+    fn points(&self, measure: usize, x: impl Fn(&Setting) -> Option<f64>) -> Vec<Point> {
+        let at = |p: &Setting| {
+            let error = p.errors.get(measure).copied().flatten()?;
+            let (y, low) = (error.value.filter(|v| *v > 0.0)?, error.low.filter(|v| *v > 0.0)?);
+            let bar = error.high.filter(|high| *high > low).map(|high| (low, high));
+            Some(Point { x: x(p)?, y, bar })
+        };
+        self.points.iter().filter_map(at).collect()
+    }
+}
+
+/// Series with colours of their own; those of single settings are dots.
+fn series<'a>(curves: impl Iterator<Item = (&'a SweepCurve, Vec<Point>, bool)>) -> Vec<Series> {
+    let filled = curves.filter(|(_, points, _)| !points.is_empty()).enumerate();
+    filled
+        .map(|(color, (curve, points, alone))| {
+            let marks = if alone { Marks::Dots } else { Marks::Both };
+            Series { name: curve.name.clone(), marks, points, color }
+        })
+        .collect()
+}
