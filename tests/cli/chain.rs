@@ -252,10 +252,10 @@ fn raw_readings_reduce_to_the_measurement_and_fit_within_its_errors() {
 fn repeats_tell_the_noise_of_a_detector_that_nobody_described() {
     let b = Bench::new();
     let known = "[instrument.reference]\nreflectance = 0.985\nreflectance_u = 0.003\n";
-    b.write("known.toml", &format!("version = 1\n[instrument]\nelectrons = 0\n{known}"));
+    b.write("known.toml", format!("version = 1\n[instrument]\nelectrons = 0\n{known}"));
     for (readings, stated) in [("5", true), ("1", false)] {
         let all = format!("version = 1\n[instrument]\nelectrons = 1e5\nreadings = {readings}\n{known}");
-        b.write("lab.toml", &format!("{all}[instrument.protocol]\nrepeats = 1\n"));
+        b.write("lab.toml", format!("{all}[instrument.protocol]\nrepeats = 1\n"));
         let simulate = ["simulate", "--material", "satin", "--instrument", "lab.toml", "--scan", "in-plane:5"];
         b.ok(&[&simulate[..], &["--raw", "raw.csv", "--out", "first.csv"]].concat());
         let ran = b.run(&["reduce", "raw.csv", "--instrument", "known.toml", "--out", "m.csv"]);

@@ -176,7 +176,7 @@ fn intervals_hold_through_steps_that_nobody_described() {
                 all += 1;
             }
         }
-        let share = held as f64 / all as f64;
+        let share = held as f64 / f64::from(all);
         println!("noise of {steps} steps: {:.1} % of {all} intervals hold", 100.0 * share);
         assert!(share > 0.9, "{steps}: {share}");
     }
@@ -260,7 +260,7 @@ fn repeats_that_scatter_more_than_described_are_told() {
     println!("{note}");
     let stop = raw.readings[spoilt].stop;
     let of_stop = raw.readings.iter().filter(|r| r.stop == stop);
-    let (first, last) = (of_stop.clone().next().expect("one"), of_stop.last().expect("one"));
+    let (first, last) = (of_stop.clone().next().expect("one"), of_stop.clone().next_back().expect("one"));
     let middle = 0.5 * (first.time_s + last.time_s + last.exposure_s);
     assert!(note.contains(&format!("most at {middle} s")), "{note}");
 }

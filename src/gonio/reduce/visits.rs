@@ -105,7 +105,7 @@ struct Base(Vec<Vec<Point>>);
 
 impl Base {
     /// From readings in order of time.
-    fn new(all: Vec<Point>) -> Self {
+    fn new(all: &[Point]) -> Self {
         let mut exposures: Vec<f64> = all.iter().map(|p| p.exposure_s).collect();
         exposures.sort_by(|a, b| b.total_cmp(a));
         exposures.dedup();
@@ -145,7 +145,7 @@ impl Visits {
         let count = |kind: Kind| stops.iter().filter(|s| s.kind == kind).count();
         let counts = [Kind::Blank, Kind::Dark, Kind::Reference].map(count);
         let mut visits = Self {
-            base: (0..width).map(base).map(Base::new).collect(),
+            base: (0..width).map(|c| Base::new(&base(c))).collect(),
             reference: (0..width).map(|c| points(Kind::Reference, c)).collect(),
             count: counts.into_iter().max().unwrap_or(0),
             has: [counts[0] + counts[1] > 0, counts[2] > 0],
