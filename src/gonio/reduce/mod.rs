@@ -7,6 +7,7 @@
 mod alike;
 mod bend;
 mod budget;
+mod curve;
 mod effect;
 mod noise;
 pub(super) mod positions;
