@@ -10,10 +10,10 @@ use super::camera::Camera;
 use super::integrator::{PathResult, Strategy, Tracer, Watch};
 use super::layers::{Gathered, LayerSet, Sight, layer};
 use super::noise::{Noise, PictureError, relative_squares, standard_errors};
-use super::packet::{FlatScene, Found, Packets};
+use super::packet::{FlatScene, Packets};
 use super::pixel::Pixel;
 use super::plan::Plan;
-use super::points::{Draws, key_of};
+use super::points::{Draws, keys_of};
 use super::scene::{Scene, SceneSpec};
 use super::schedule::Schedule;
 use super::tiles::{TILE, TILE_ROOM, Tile, Tiles};
@@ -376,9 +376,9 @@ impl Painter<'_> {
         let mut bad = 0;
         for slot in tile.slots() {
             let (x, y) = (tile.x + slot % TILE, tile.y + slot / TILE);
-            let key = key_of(self.seed, x as u32, y as u32);
+            let keys = keys_of(self.seed, x as u32, y as u32);
             for sample in done..done + samples {
-                let draws = Draws::new(key, sample);
+                let draws = Draws::new(keys, sample);
                 let ray = self.camera.ray(x, y, draws);
                 let mut watch = W::default();
                 let path = self.tracer.trace(ray, draws, &mut watch);
@@ -392,19 +392,15 @@ impl Painter<'_> {
     }
 }
 
-/// The same by packets: paths of the last that are too many don't count.
+/// The same by packets.
 fn by_packets(packets: &Packets<'_>, tile: Tile, pixels: &mut [Pixel], (done, samples): (u32, u32)) -> u64 {
     let mut bad = 0;
-    let mut take = |slot: usize, packet: u32, found: &Found| {
-        let left = (samples as usize - packet as usize * LANES).min(LANES);
-        for ((r, g), b) in found[0].iter().zip(&found[1]).zip(&found[2]).take(left) {
-            let radiance = DVec3::new(*r, *g, *b);
-            debug_assert!(radiance.is_finite(), "tile at ({}, {}), {slot}: radiance {radiance}", tile.x, tile.y);
-            bad += u64::from(!radiance.is_finite());
-            pixels[slot].add(&PathResult { radiance, unknown: 0.0 });
-        }
+    let mut take = |slot: usize, radiance: DVec3| {
+        debug_assert!(radiance.is_finite(), "tile at ({}, {}), {slot}: radiance {radiance}", tile.x, tile.y);
+        bad += u64::from(!radiance.is_finite());
+        pixels[slot].add(&PathResult { radiance, unknown: 0.0 });
     };
-    packets.tile(tile, done, samples.div_ceil(LANES as u32), &mut take);
+    packets.tile(tile, done, samples, &mut take);
     bad
 }
 
