@@ -19,7 +19,6 @@ use super::schedule::Schedule;
 use super::tiles::{TILE, TILE_ROOM, Tile, Tiles};
 use crate::control::Control;
 use crate::image::{Image, Metadata};
-use crate::numeric::simd::LANES;
 
 /// Samples that a tile's pixels get between two looks at the clock and the wish to stop.
 const PASS: u32 = 32;
@@ -270,7 +269,7 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     if !schedule.adapts() {
         control.progress.start("render", u64::from(options.samples) * tiles.count() as u64);
     }
-    let mut more = Some(schedule.first(if painter.packets.is_some() { LANES as u32 } else { 1 }));
+    let mut more = Some(schedule.first(if painter.packets.is_some() { 8 } else { 1 }));
     let mut state = String::new();
     while let Some(round) = more.take() {
         if schedule.adapts() {

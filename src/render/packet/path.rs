@@ -11,8 +11,8 @@ use super::flat::FlatScene;
 use super::lobes::cosine_hemisphere;
 use super::shapes::Rays;
 use super::wave::{Group, Row, WAVE, Wave};
-use crate::numeric::lanes::{Mask, Vec3};
-use crate::numeric::simd::{Kernel, LANES, Lanes, Simd, vectorised};
+use crate::numeric::lanes::{LANES, Lanes, Mask, Vec3};
+use crate::numeric::simd::{Kernel, Simd, vectorised};
 
 /// Walks through a scene in packets.
 #[derive(Debug)]
@@ -88,7 +88,7 @@ impl<'a> Packets<'a> {
         group.put3(Row::Radiance, none);
         group.put3(Row::Position, rays.origin);
         group.put3(Row::Normal, none);
-        group.put(Row::Pdf, Lanes::splat(simd, f64::INFINITY));
+        group.put(Row::Spread, Lanes::splat(simd, 0.0));
         group.note(simd, Row::Plain, Mask::splat(simd, false));
     }
 

@@ -1,6 +1,6 @@
 //! What a group's paths do at a scattering event.
 
-use std::f64::consts::FRAC_1_PI;
+use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::DVec3;
 
@@ -9,14 +9,14 @@ use super::super::lights::{Light, QuadLight};
 use super::super::points::{Decision, Points};
 use super::closed::projected_solid_angle;
 use super::flat::light_number;
-use super::lights::{Arrivals, between, from_quad, quad_pdf};
+use super::lights::{Arrivals, between, from_quad, quad_spread};
 use super::lobes::{Frames, LobesAt, cosine_hemisphere};
 use super::occluders::Occluders;
 use super::path::Packets;
 use super::shapes::{Points3, Rays};
 use super::wave::{Group, Row};
-use crate::numeric::lanes::{Mask, Vec3};
-use crate::numeric::simd::{LANES, Lanes, Simd};
+use crate::numeric::lanes::{LANES, Lanes, Mask, Vec3};
+use crate::numeric::simd::Simd;
 
 /// What paths carry.
 struct Load<S: Simd> {
@@ -41,18 +41,18 @@ struct Event<'a> {
     bounce: u32,
 }
 
-/// Where a light fills less than a steradian (its density is above 1/sr), points of it alone show a surface without Phong lobes
+/// Where a light fills at most a steradian (1/density is its `spread`), points of it alone show a surface without Phong lobes
 /// more evenly than rays that find it by chance now and then; what they carry is bounded either way.
 #[inline(always)]
-fn left_to_light<S: Simd>(density: Lanes<S>) -> Mask<S> {
-    density.at_least(density.number(1.0))
+fn left_to_light<S: Simd>(spread: Lanes<S>) -> Mask<S> {
+    spread.number(1.0).at_least(spread)
 }
 
-/// The power heuristic's weight of what was drawn with density `own`, and might have been with `other`.
+/// The power heuristic's weight of what was drawn with density 1/`spread`, and might have been with `other`.
 #[inline(always)]
-fn weight<S: Simd>(own: Lanes<S>, other: Lanes<S>) -> Lanes<S> {
-    let ratio = other / own;
-    let one = own.number(1.0);
+fn weight<S: Simd>(spread: Lanes<S>, other: Lanes<S>) -> Lanes<S> {
+    let ratio = other * spread;
+    let one = spread.number(1.0);
     one / ratio.mul_add(ratio, one)
 }
 
@@ -68,13 +68,13 @@ impl Packets<'_> {
         let mut alive = group.says(simd, Row::Alive);
         let mut radiance = group.get3(simd, Row::Radiance);
         let throughput = group.get3(simd, Row::Throughput);
-        let (plain, pdf) = (group.says(simd, Row::Plain), group.get(simd, Row::Pdf));
+        let (plain, spread) = (group.says(simd, Row::Plain), group.get(simd, Row::Spread));
         if let Some(environment) = scene.environment
             && (bounce == 0 || self.surround.is_none())
         {
             let missed = alive & !met.hit;
             let other = group.get3(simd, Row::Normal).dot(rays.direction).max(zero) * zero.number(FRAC_1_PI);
-            let light = Vec3::splat(simd, environment) * weight(pdf, other);
+            let light = Vec3::splat(simd, environment) * weight(spread, other);
             radiance = radiance + missed.keep3(throughput.times(light));
         }
         alive = alive & met.hit & zero.above(met.at.normal.dot(rays.direction));
@@ -86,9 +86,14 @@ impl Packets<'_> {
             if found.any() {
                 // The first ray is not weighed: it finds what the eye sees.
                 let from = group.get3(simd, Row::Position);
-                let other = if bounce == 0 { zero } else { quad_pdf(light, from, met.at.position) };
-                found = found & !(plain & left_to_light(other));
-                let shone = Vec3::splat(simd, light.radiance) * weight(pdf, other);
+                let (other, aimed) = if bounce == 0 {
+                    (zero, t_max)
+                } else {
+                    let aimed = quad_spread(light, from, met.at.position);
+                    (zero.number(1.0) / aimed, aimed)
+                };
+                found = found & !(plain & left_to_light(aimed));
+                let shone = Vec3::splat(simd, light.radiance) * weight(spread, other);
                 radiance = radiance + found.keep3(throughput.times(shone));
             }
         }
@@ -127,11 +132,11 @@ impl Packets<'_> {
             load.alive = Mask::splat(simd, false);
         }
         if load.alive.any() {
-            let (rays, pdf) = event.go_on::<S, GLOSSY>(&vertices, &mut load);
+            let (rays, spread) = event.go_on::<S, GLOSSY>(&vertices, &mut load);
             group.put3(Row::Origin, rays.origin);
             group.put3(Row::Direction, rays.direction);
             group.put3(Row::Throughput, load.throughput);
-            group.put(Row::Pdf, pdf);
+            group.put(Row::Spread, spread);
             group.note(simd, Row::Plain, vertices.lobes.plain);
         }
         group.put3(Row::Radiance, load.radiance);
@@ -159,7 +164,7 @@ impl Event<'_> {
         let scene = self.packets.scene;
         let at = &vertices.at;
         let one = vertices.wo.z.number(1.0);
-        let infinite = one.number(f64::INFINITY);
+        let (zero, infinite) = (one.number(0.0), one.number(f64::INFINITY));
         let simd = one.simd();
         for (k, light) in scene.lights.iter().enumerate() {
             let (arrivals, strength) = match light {
@@ -167,11 +172,11 @@ impl Event<'_> {
                     let to = at.position.vector(*position);
                     let shadow = between(at.above(), to);
                     let distance2 = (to - at.position).length_squared();
-                    (Arrivals { some: load.alive, shadow, strength: one / distance2, pdf: infinite }, *intensity)
+                    (Arrivals { some: load.alive, shadow, strength: one / distance2, spread: zero }, *intensity)
                 }
                 Light::Directional { toward, irradiance } => {
                     let shadow = Rays { origin: at.above(), direction: at.position.vector(*toward), t_max: infinite };
-                    (Arrivals { some: load.alive, shadow, strength: one, pdf: infinite }, *irradiance)
+                    (Arrivals { some: load.alive, shadow, strength: one, spread: zero }, *irradiance)
                 }
                 Light::Quad(quad) => {
                     if self.packets.is_closed(k) {
@@ -198,13 +203,13 @@ impl Event<'_> {
         } else if let Some(radiance) = scene.environment {
             let (u, v) = self.point(simd, Decision::Environment);
             let local = cosine_hemisphere(u, v);
-            let pdf = local.z * one.number(FRAC_1_PI);
+            let spread = one.number(PI) / local.z;
             let direction = vertices.frame.to_world(local).normalize();
             let shadow = Rays { origin: at.above(), direction, t_max: infinite };
-            let some = pdf.above(one.number(0.0));
+            let some = local.z.above(zero);
             self.add_unhidden::<S, GLOSSY>(
                 vertices,
-                &Arrivals { some, shadow, strength: one / pdf, pdf },
+                &Arrivals { some, shadow, strength: spread, spread },
                 radiance,
                 &scene.before_environment,
                 load,
@@ -245,8 +250,8 @@ impl Event<'_> {
             lit = lit & !occluders.hide(&arrivals.shadow);
         }
         let (value, pdf) = vertices.lobes.evaluate::<GLOSSY>(wi, vertices.wo);
-        let alone = vertices.lobes.plain & left_to_light(arrivals.pdf);
-        let factor = wi.z * arrivals.strength * weight(arrivals.pdf, alone.select(zero, pdf));
+        let alone = vertices.lobes.plain & left_to_light(arrivals.spread);
+        let factor = wi.z * arrivals.strength * weight(arrivals.spread, alone.select(zero, pdf));
         let light = value.times(value.vector(strength)) * factor;
         load.radiance = load.radiance + lit.keep3(load.throughput.times(light));
     }
@@ -262,7 +267,8 @@ impl Event<'_> {
         let above = wi.z.above(one.number(0.0));
         let (value, pdf) = vertices.lobes.evaluate::<GLOSSY>(wi, vertices.wo);
         load.alive = load.alive & above & pdf.above(one.number(0.0));
-        load.throughput = load.throughput.times(value * (wi.z / pdf));
+        let spread = one / pdf;
+        load.throughput = load.throughput.times(value * (wi.z * spread));
         if self.bounce >= ROULETTE_AFTER {
             let q = load.throughput.abs().largest();
             let may_end = one.above(q);
@@ -272,6 +278,6 @@ impl Event<'_> {
         }
         load.alive = load.alive & load.throughput.abs().largest().above(one.number(0.0));
         let direction = vertices.frame.to_world(wi).normalize();
-        (Rays { origin: vertices.at.above(), direction, t_max: one.number(f64::INFINITY) }, pdf)
+        (Rays { origin: vertices.at.above(), direction, t_max: one.number(f64::INFINITY) }, spread)
     }
 }

@@ -1,11 +1,11 @@
-//! Paths that are followed together: eight to a group, those that still run at the front, so that no lane waits for a path that has ended.
+//! Paths that are followed together: [`LANES`] to a group, those that still run at the front, so that no lane waits for a path that has ended.
 
 use glam::DVec3;
 
 use super::super::points::{Points, half_of};
 use super::flat::OwnerNumber;
-use crate::numeric::lanes::{Mask, Vec3};
-use crate::numeric::simd::{Eight, LANES, Lanes, Simd};
+use crate::numeric::lanes::{self, LANES, Lanes, Mask, Vec3};
+use crate::numeric::simd::Simd;
 
 /// Paths of a wave: few enough for the second cache, enough that the last group's empty lanes don't matter.
 pub(super) const WAVE: usize = 256;
@@ -25,8 +25,8 @@ pub(super) enum Row {
     Error = 18,
     /// Whose that is.
     Owner = 21,
-    /// Density with which the ray was drawn.
-    Pdf = 22,
+    /// 1/density with which the ray was drawn, sr.
+    Spread = 22,
     /// 1 where the surface that it left has no Phong lobes.
     Plain = 23,
     /// 1 where it runs.
@@ -35,11 +35,11 @@ pub(super) enum Row {
 
 const ROWS: usize = 25;
 
-/// Eight paths.
+/// Paths side by side.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
 pub(super) struct Group {
-    rows: [Eight; ROWS],
+    rows: [lanes::Row; ROWS],
     keys: [u64; LANES],
     places: [u32; LANES],
     /// Which of the wave's paths they are.
