@@ -223,8 +223,10 @@ mod tests {
     fn eight_abreast_are_those_of_one_at_a_time() {
         let keys: [_; 8] = std::array::from_fn(|k| keys_of(5, k as u32, 9));
         let sample = |k: usize| 16 + 3 * k as u32;
-        let points =
-            Points::of(std::array::from_fn(|k| keys[k][half_of(sample(k))]), std::array::from_fn(|k| sample(k) >> 1));
+        let points = Points::<8>::of(
+            std::array::from_fn(|k| keys[k][half_of(sample(k))]),
+            std::array::from_fn(|k| sample(k) >> 1),
+        );
         let (x, y) = points.pair(3);
         for k in 0..8 {
             let draws = Draws::new(keys[k], sample(k)).at(3);

@@ -47,9 +47,9 @@ impl<'a> Packets<'a> {
         decision.number(bounce, self.scene.lights.len())
     }
 
-    /// Follows so many paths through every pixel of a tile, after the `done` that each has.
-    pub fn tile(&self, tile: Tile, done: u32, samples: u32, take: Take<'_>) {
-        vectorised(Work { packets: self, tile, done, samples, take });
+    /// Follows so many paths through every pixel of a tile, after the `done` that each has; how many rays they sent out.
+    pub fn tile(&self, tile: Tile, done: u32, samples: u32, take: Take<'_>) -> u64 {
+        vectorised(Work { packets: self, tile, done, samples, take })
     }
 
     /// Follows the paths of a wave to their ends.
@@ -57,6 +57,7 @@ impl<'a> Packets<'a> {
     fn follow<S: Simd>(&self, simd: S, wave: &mut Wave) {
         let most = self.plan.events(self.scene.max_bounces);
         for bounce in 0..=most {
+            wave.count_rays();
             for group in wave.groups() {
                 self.arrive(simd, group, bounce);
             }
@@ -89,6 +90,7 @@ impl<'a> Packets<'a> {
         group.put3(Row::Position, rays.origin);
         group.put3(Row::Normal, none);
         group.put(Row::Spread, Lanes::splat(simd, 0.0));
+        group.put(Row::Aimed, Lanes::splat(simd, 0.0));
         group.note(simd, Row::Plain, Mask::splat(simd, false));
     }
 
@@ -138,10 +140,10 @@ impl Work<'_> {
 }
 
 impl Kernel for Work<'_> {
-    type Output = ();
+    type Output = u64;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
+    fn run<S: Simd>(self, simd: S) -> u64 {
         let (packets, tile) = (self.packets, self.tile);
         let seed = packets.seed;
         let paths = tile.width * tile.height * self.samples as usize;
@@ -170,5 +172,6 @@ impl Kernel for Work<'_> {
                 (self.take)(y * TILE + x, *radiance);
             }
         }
+        wave.rays()
     }
 }

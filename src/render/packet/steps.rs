@@ -23,6 +23,8 @@ struct Load<S: Simd> {
     alive: Mask<S>,
     throughput: Vec3<S>,
     radiance: Vec3<S>,
+    /// Rays towards lights.
+    aimed: Lanes<S>,
 }
 
 /// Surfaces and the eye's directions in their frames.
@@ -124,6 +126,7 @@ impl Packets<'_> {
             alive: group.says(simd, Row::Alive) & wo.z.above(wo.z.number(0.0)) & !lobes.black,
             throughput: group.get3(simd, Row::Throughput),
             radiance: group.get3(simd, Row::Radiance),
+            aimed: group.get(simd, Row::Aimed),
         };
         let vertices = Vertices { at, frame, wo, lobes };
         let event = Event { packets: self, points: group.points(), bounce };
@@ -140,6 +143,7 @@ impl Packets<'_> {
             group.note(simd, Row::Plain, vertices.lobes.plain);
         }
         group.put3(Row::Radiance, load.radiance);
+        group.put(Row::Aimed, load.aimed);
         group.note(simd, Row::Alive, load.alive);
     }
 }
@@ -247,6 +251,7 @@ impl Event<'_> {
             return;
         }
         if self.packets.plan.shadows && !occluders.is_empty() {
+            load.aimed = load.aimed + lit.keep(zero.number(1.0));
             lit = lit & !occluders.hide(&arrivals.shadow);
         }
         let (value, pdf) = vertices.lobes.evaluate::<GLOSSY>(wi, vertices.wo);

@@ -31,9 +31,11 @@ pub(super) enum Row {
     Plain = 23,
     /// 1 where it runs.
     Alive = 24,
+    /// Rays that were sent towards lights.
+    Aimed = 25,
 }
 
-const ROWS: usize = 25;
+const ROWS: usize = 26;
 
 /// Paths side by side.
 #[derive(Debug, Clone)]
@@ -96,6 +98,8 @@ pub(super) struct Wave {
     running: usize,
     /// Radiance of those that have ended, by their number.
     found: Vec<DVec3>,
+    /// Rays that were sent out.
+    rays: u64,
 }
 
 impl Wave {
@@ -103,7 +107,7 @@ impl Wave {
     pub fn new() -> Self {
         let (keys, places, numbers) = ([0; LANES], [0; LANES], [0; LANES]);
         let group = Group { rows: [[0.0; LANES]; ROWS], keys, places, numbers };
-        Self { groups: vec![group; WAVE / LANES], running: 0, found: vec![DVec3::ZERO; WAVE] }
+        Self { groups: vec![group; WAVE / LANES], running: 0, found: vec![DVec3::ZERO; WAVE], rays: 0 }
     }
 
     /// Begins with the samples of pixels that `path` tells by number: the pixel's keys and the sample.
@@ -126,6 +130,17 @@ impl Wave {
     #[inline(always)]
     pub fn running(&self) -> usize {
         self.running
+    }
+
+    /// Every path sends out a ray.
+    #[inline(always)]
+    pub fn count_rays(&mut self) {
+        self.rays += self.running as u64;
+    }
+
+    /// Rays that were sent out by paths that have ended, and on their ways.
+    pub fn rays(&self) -> u64 {
+        self.rays
     }
 
     /// Groups that hold them.
@@ -152,6 +167,7 @@ impl Wave {
             let (group, k) = (&self.groups[i / LANES], i % LANES);
             let radiance = |c: usize| group.rows[Row::Radiance as usize + c][k];
             self.found[group.numbers[k] as usize] = DVec3::new(radiance(0), radiance(1), radiance(2));
+            self.rays += group.rows[Row::Aimed as usize][k] as u64;
             self.running -= 1;
             if i < self.running {
                 self.copy(self.running, i);
