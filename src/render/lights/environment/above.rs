@@ -132,9 +132,12 @@ impl Above {
     pub fn draw(&self, grid: &LatLong, normal: DVec3, mut u: DVec2) -> Option<Drawn> {
         let normal = normal.as_vec3();
         let (mut node, mut range, mut probability) = (&self.nodes[0], self.whole, 1.0);
+        if node.gives(normal) <= 0.0 {
+            return None;
+        }
         while node.halves > 0 {
             let (first, second) = (&self.nodes[node.halves as usize], &self.nodes[node.halves as usize + 1]);
-            let p = share_of_first(first, second, normal)?;
+            let p = share_of_first(first, second, normal);
             let (a, b, by_rows) = range.halves();
             let number = if by_rows { &mut u.x } else { &mut u.y };
             if *number < p {
@@ -156,7 +159,7 @@ impl Above {
         let (mut node, mut range, mut probability) = (&self.nodes[0], self.whole, 1.0);
         while node.halves > 0 {
             let (first, second) = (&self.nodes[node.halves as usize], &self.nodes[node.halves as usize + 1]);
-            let p = share_of_first(first, second, normal).unwrap_or(0.0);
+            let p = share_of_first(first, second, normal);
             let (a, b, by_rows) = range.halves();
             let in_first = if by_rows { row < a.rows.1 } else { column < a.columns.1 };
             (node, range) = if in_first { (first, a) } else { (second, b) };
@@ -167,9 +170,9 @@ impl Above {
     }
 }
 
-/// The probability of the first of two branches; `None` where neither gives light.
+/// The probability of the first of two branches. Where neither gives light, the horizon having cut a corner of both together, it does not matter.
 #[inline]
-fn share_of_first(first: &Node, second: &Node, normal: Vec3) -> Option<f64> {
-    let (a, b) = (first.gives(normal), second.gives(normal));
-    (a + b > 0.0).then(|| f64::from(a) / (f64::from(a) + f64::from(b)))
+fn share_of_first(first: &Node, second: &Node, normal: Vec3) -> f64 {
+    let (a, b) = (f64::from(first.gives(normal)), f64::from(second.gives(normal)));
+    if a + b > 0.0 { a / (a + b) } else { 0.5 }
 }
