@@ -22,7 +22,8 @@ fn picture(scene: &Scene, options: Options) -> Film {
 /// Mean radiance of a picture, W/(sr·m²).
 fn mean(film: &Film) -> f64 {
     let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
-    pixels.filter_map(|(x, y)| film.radiance(x, y)).map(|p| p.element_sum()).sum::<f64>() / f64::from(3 * SIDE * SIDE)
+    pixels.filter_map(|(x, y)| film.radiance(x, y)).map(glam::DVec3::element_sum).sum::<f64>()
+        / f64::from(3 * SIDE * SIDE)
 }
 
 /// The mean of relative differences with its standard error, that of the truth's own mean added: what samples that decide where more are taken
