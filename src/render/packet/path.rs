@@ -130,12 +130,33 @@ struct Work<'a> {
     take: Take<'a>,
 }
 
+/// A path's pixel in its tile, the keys of that, and its sample.
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    x: usize,
+    y: usize,
+    keys: [u64; 2],
+    sample: u32,
+}
+
 impl Work<'_> {
-    /// The pixel in the tile, and the sample, of the path of this number: all of a pixel's, then the next one's.
     #[inline(always)]
-    fn place(&self, path: usize) -> (usize, usize, u32) {
-        let (pixel, sample) = (path / self.samples as usize, (path % self.samples as usize) as u32);
-        (pixel % self.tile.width, pixel / self.tile.width, self.done.wrapping_add(sample))
+    fn place(&self, x: usize, y: usize) -> Place {
+        let keys = keys_of(self.packets.seed, (self.tile.x + x) as u32, (self.tile.y + y) as u32);
+        Place { x, y, keys, sample: self.done }
+    }
+
+    /// The path after another: all of a pixel's, then the next one's, row after row.
+    #[inline(always)]
+    fn after(&self, place: Place) -> Place {
+        let sample = place.sample.wrapping_add(1);
+        if sample.wrapping_sub(self.done) < self.samples {
+            Place { sample, ..place }
+        } else if place.x + 1 < self.tile.width {
+            self.place(place.x + 1, place.y)
+        } else {
+            self.place(0, place.y + 1)
+        }
     }
 }
 
@@ -145,31 +166,28 @@ impl Kernel for Work<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u64 {
         let (packets, tile) = (self.packets, self.tile);
-        let seed = packets.seed;
         let paths = tile.width * tile.height * self.samples as usize;
         let mut wave = Wave::new();
+        let mut places = vec![Place::default(); WAVE];
+        let mut next = self.place(0, 0);
         for first in (0..paths).step_by(WAVE) {
             let count = WAVE.min(paths - first);
-            let at = |path: usize| {
-                let (x, y, sample) = self.place(first + path);
-                (tile.x + x, tile.y + y, sample)
-            };
-            wave.begin(count, |path| {
-                let (x, y, sample) = at(path);
-                (keys_of(seed, x as u32, y as u32), sample)
-            });
+            for place in &mut places[..count] {
+                *place = next;
+                next = self.after(next);
+            }
+            wave.begin(count, |path| (places[path].keys, places[path].sample));
             for (g, group) in wave.groups().iter_mut().enumerate() {
                 let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
                 for k in 0..LANES {
-                    let place = at((g * LANES + k).min(count - 1));
-                    (x[k], y[k]) = (place.0 as f64, place.1 as f64);
+                    let place = &places[(g * LANES + k).min(count - 1)];
+                    (x[k], y[k]) = ((tile.x + place.x) as f64, (tile.y + place.y) as f64);
                 }
                 packets.start(simd, group, (Lanes::load(simd, &x), Lanes::load(simd, &y)));
             }
             packets.follow(simd, &mut wave);
-            for (path, radiance) in wave.found()[..count].iter().enumerate() {
-                let (x, y, _) = self.place(first + path);
-                (self.take)(y * TILE + x, *radiance);
+            for (place, radiance) in places.iter().zip(&wave.found()[..count]) {
+                (self.take)(place.y * TILE + place.x, *radiance);
             }
         }
         wave.rays()
