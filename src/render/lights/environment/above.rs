@@ -170,9 +170,11 @@ impl Above {
     }
 }
 
-/// The probability of the first of two branches. Where neither gives light, the horizon having cut a corner of both together, it does not matter.
+/// The probability of the first of two branches. Where neither gives light, the horizon having cut a corner of both together, it does not matter, but
+/// what is dark is never drawn.
 #[inline]
 fn share_of_first(first: &Node, second: &Node, normal: Vec3) -> f64 {
     let (a, b) = (f64::from(first.gives(normal)), f64::from(second.gives(normal)));
+    let (a, b) = if a + b > 0.0 { (a, b) } else { (f64::from(first.light), f64::from(second.light)) };
     if a + b > 0.0 { a / (a + b) } else { 0.5 }
 }

@@ -182,12 +182,14 @@ mod tests {
         }
     }
 
-    /// A surface that looks away from all light gets none, and no direction.
+    /// A surface that looks away from all light gets none.
     #[test]
-    fn what_nothing_lights_has_no_direction() {
+    fn what_looks_away_gets_nothing() {
         let sky = environment(picture(32, 17, |_, j| [f32::from(u8::from(j < 4)); 3]), 0.0);
-        assert!(sky.sample(-DVec3::Y, DVec2::splat(0.4)).is_none());
-        assert!(sky.sample(DVec3::Y, DVec2::splat(0.4)).is_some());
+        for u in [0.01, 0.4, 0.9] {
+            assert!(sky.sample(-DVec3::Y, DVec2::splat(u)).is_none_or(|(d, _, _)| d.y > 0.0));
+            assert!(sky.sample(DVec3::Y, DVec2::splat(u)).is_some_and(|(d, _, pdf)| d.y > 0.0 && pdf > 0.0));
+        }
     }
 
     /// ∫ f over every cell apart, as (column, row) → value; f is smooth within a cell.
