@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use common::{excess, mean, picture, scene};
 use glam::DVec3;
 use goniofit::control::Control;
+use goniofit::image::compare;
 use goniofit::numeric::random::{Purpose, RngExt, Stream, stream};
 use goniofit::render::{Film, Options, Plan, Scene, render};
 
@@ -110,6 +111,91 @@ fn every_plan_shows_what_the_full_integrator_shows() {
     for k in 0..5 {
         assert!(plans.iter().any(|p| p[k]) && plans.iter().any(|p| !p[k]), "flag {k} is the same in all: {plans:?}");
     }
+}
+
+/// A box or a part of one, black pieces and balls in it, a lamp of one or two quads that touch, perhaps light from all around.
+fn boxed(rng: &mut Stream) -> String {
+    let mut text = format!(
+        "version = 1\nname = \"boxed\"\nmax_bounces = {}\n[camera]\nposition = [0, 1, 2.8]\ntarget = [0, 0.9, 0]\nfov_deg = 50\n\
+         [materials]\nnone = {{ black = true }}\nplain = {{ kd = {} }}\nother = {{ kd = {} }}\n\
+         glossy = {{ kd = {}, phong = [{{ ks = {}, n = {:.1} }}] }}\n",
+        rng.random_range(1..6u32),
+        triple(rng, 0.2, 0.8),
+        triple(rng, 0.2, 0.8),
+        triple(rng, 0.05, 0.4),
+        triple(rng, 0.1, 0.5),
+        number(rng, 0.0, 120.0),
+    );
+    // Six walls that look inwards; the box is closed in half of the scenes.
+    let walls = [
+        "center = [0, 0, 1]\nu = [1, 0, 0]\nv = [0, 0, -2]",
+        "center = [0, 2, 1]\nu = [1, 0, 0]\nv = [0, 0, 2]",
+        "center = [0, 1, -1]\nu = [1, 0, 0]\nv = [0, 1, 0]",
+        "center = [-1, 1, 1]\nu = [0, 0, -2]\nv = [0, 1, 0]",
+        "center = [1, 1, 1]\nu = [0, 0, 2]\nv = [0, 1, 0]",
+        "center = [0, 1, 3]\nu = [-1, 0, 0]\nv = [0, 1, 0]",
+    ];
+    let closed = rng.random::<bool>();
+    for (k, wall) in walls.iter().enumerate() {
+        if closed || k == 0 || rng.random_range(0..3u32) > 0 {
+            let material = ["plain", "other", "plain", "glossy"][rng.random_range(0..4usize)];
+            let _ = writeln!(text, "[[quad]]\n{wall}\nmaterial = \"{material}\"");
+        }
+    }
+    for _ in 0..rng.random_range(0..3u32) {
+        let (center, u, v) = (triple(rng, -0.5, 0.5), triple(rng, 0.1, 0.4), triple(rng, -0.4, -0.1));
+        let _ = writeln!(text, "[[quad]]\ncenter = {center}\nu = {u}\nv = {v}\nmaterial = \"none\"");
+    }
+    for _ in 0..rng.random_range(0..3u32) {
+        let material = ["plain", "glossy", "none"][rng.random_range(0..3usize)];
+        let (x, y, r) = (number(rng, -0.5, 0.5), number(rng, 0.4, 1.2), number(rng, 0.15, 0.4));
+        let _ = writeln!(
+            text,
+            "[[sphere]]\ncenter = [{x:.3}, {y:.3}, {:.3}]\nradius = {r:.3}\nmaterial = \"{material}\"",
+            number(rng, -0.4, 0.8)
+        );
+    }
+    let (x, size, height) = (number(rng, -0.3, 0.3), number(rng, 0.1, 0.4), number(rng, 1.5, 1.99));
+    for k in 0..rng.random_range(1..3u32) {
+        // The second lies beside the first, edge to edge.
+        let z = 0.3 + 2.0 * size * f64::from(k);
+        let _ = writeln!(
+            text,
+            "[[light.quad]]\ncenter = [{x:.3}, {height:.3}, {z:.6}]\nu = [{size:.3}, 0, 0]\nv = [0, 0, {size:.3}]\nradiance = [9, 8, {}]",
+            4 + k
+        );
+    }
+    if rng.random_range(0..3u32) == 0 {
+        text += "[light.environment]\nradiance = [0.3, 0.2, 0.4]\n";
+    }
+    text
+}
+
+/// Pixel by pixel and block by block, as `compare` tests pictures.
+#[test]
+fn boxes_lamps_and_black_pieces_look_as_by_the_full_integrator() {
+    let mut plans = BTreeSet::new();
+    let mut rng = stream(13, Purpose::Study, 0);
+    let cases = 24;
+    for case in 0..cases {
+        let text = boxed(&mut rng);
+        let built = scene(&text);
+        let plan = Plan::of(&built);
+        assert!(plan.packets, "{plan:?}");
+        plans.insert([plan.shadows, plan.interreflection, plan.chance, plan.closed_forms]);
+        let (by_plan, by_all) = (picture(&built, 32, 64, 2 * case), full(&built, 32, 64, 2 * case + 1));
+        let found = compare(&by_plan.to_image(), &by_all.to_image()).expect("pictures of one size");
+        let found = found.significance.expect("standard errors are known");
+        // 1 % for all cases together.
+        let level = 0.01 / f64::from(cases as u32);
+        let (z, at) = (found.max_z, found.at);
+        assert!(
+            found.p > level && found.blocks.p > level,
+            "case {case}, {plan:?}: {z} σ at {at:?}, p {:e}\n{text}",
+            found.p
+        );
+    }
+    assert!(plans.len() >= 2, "too few kinds of plans: {plans:?}");
 }
 
 /// Where nothing is left to chance but the point in the pixel, which both take alike.

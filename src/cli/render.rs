@@ -144,15 +144,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     for (option, out) in outputs {
         out.map_or(Ok(()), |out| keeps_inputs(option, out, files.iter().map(PathBuf::as_path)))?;
     }
-    check_extension(&args.out, "exr", "--out")?;
-    check_folder(&args.out)?;
-    stdout_is_free(&args.out, ui)?;
-    if let Some(png) = &args.png {
-        check_extension(png, "png", "--png")?;
-        check_folder(png)?;
-        stdout_is_free(png, ui)?;
-        distinct_outputs(("--out", &args.out), ("--png", png))?;
-    }
+    check_outputs(args, ui)?;
     let options = args.options(&stage, ui);
     let image = match &args.material {
         Some(name) => chain::picture_of(name, args.picture.rgb.as_ref(), &stage, &options, ui.control())?,
@@ -170,27 +162,62 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         let exposure = args.exposure.unwrap_or_else(|| exposure_for(&image));
         write_bytes(png, &encode_png(&develop(&image, exposure))?)?;
     }
+    warn(args, &image, ui);
+    let taken = [Some(&args.out), args.png.as_ref()].into_iter().flatten().any(|p| p.as_os_str() == "-");
+    if !taken {
+        tell(args, &stage, &image, options.seed, ui);
+    }
+    Ok(())
+}
+
+/// Whether the pictures can be written, before anything is computed.
+fn check_outputs(args: &Args, ui: &Ui) -> Result<(), Failure> {
+    check_extension(&args.out, "exr", "--out")?;
+    check_folder(&args.out)?;
+    stdout_is_free(&args.out, ui)?;
+    if let Some(png) = &args.png {
+        check_extension(png, "png", "--png")?;
+        check_folder(png)?;
+        stdout_is_free(png, ui)?;
+        distinct_outputs(("--out", &args.out), ("--png", png))?;
+    }
+    Ok(())
+}
+
+/// Whether the picture is as good as was asked for.
+fn target_met(args: &Args, image: &Image) -> bool {
+    image.metadata.relative_error.is_some_and(|[_, most]| args.target_error.is_none_or(|t| most <= t))
+}
+
+/// What whoever looks at the picture should know.
+fn warn(args: &Args, image: &Image, ui: &Ui) {
     if ui::stop().requested() {
         ui.warn("stopped: the picture has fewer samples than asked for");
     }
-    let met = image.metadata.relative_error.is_some_and(|[_, most]| args.target_error.is_none_or(|t| most <= t));
-    if let (Some(target), false) = (args.target_error, met) {
+    if let (Some(target), false) = (args.target_error, target_met(args, image)) {
         ui.warn(&format!("the relative error asked for, {} %, was not reached", significant(100.0 * target)));
     }
-    let empty = share_of(&image, |i| image.standard_error.as_ref().is_some_and(|e| e[i][0].is_infinite()));
-    if empty > 0.0 && ended_early(&image) {
+    if image.metadata.samples == Some(1) {
+        ui.warn("pixels with one sample have no standard error: nobody can tell what is noise; take two or more");
+    }
+    let empty = share_of(image, |i| image.standard_error.as_ref().is_some_and(|e| e[i][0].is_infinite()));
+    if empty > 0.0 && ended_early(image) {
         ui.warn(&format!(
             "{:.1} % of the pixels have too few samples to be judged, or none: give more time, or a smaller --size",
             100.0 * empty
         ));
     }
-    let unknown = unknown_share(&image);
+    let unknown = unknown_share(image);
     if unknown > 0.0 {
         ui.warn(&format!(
             "{:.1} % of the pixels met directions that were not measured: they are marked in the layer `mask`",
             100.0 * unknown
         ));
     }
+}
+
+/// What was rendered, how well and how long it took.
+fn tell(args: &Args, stage: &Stage, image: &Image, seed: u64, ui: &Ui) {
     let (samples, seconds) = (image.metadata.samples.unwrap_or(0), image.metadata.seconds.unwrap_or(0.0));
     let Image { width, height, .. } = image;
     let error = image.metadata.relative_error;
@@ -204,28 +231,29 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let text = format!("{out}: {name} {width}×{height}, {samples_text} samples a pixel, {seconds:.2} s{noise}");
     let object = json!({
         "out": args.out, "png": args.png, "scene": stage.spec.name, "width": width, "height": height,
-        "samples": samples, "seconds": seconds, "seed": options.seed, "unmeasured_share": unknown, "mean_samples": image.metadata.mean_samples, "mean": mean_of(&image),
+        "samples": samples, "seconds": seconds, "seed": seed, "unmeasured_share": unknown_share(image),
+        "mean_samples": image.metadata.mean_samples, "mean": mean_of(image),
         "relative_error": error.map(|e| e[0]), "relative_error_95": error.map(|e| e[1]), "target_error": args.target_error,
-        "target_met": args.target_error.map(|_| met), "time_budget": args.time_budget.map(|t| t.as_secs_f64()),
+        "target_met": args.target_error.map(|_| target_met(args, image)), "time_budget": args.time_budget.map(|t| t.as_secs_f64()),
         "layers": image.layers.iter().map(|l| l.kind).collect::<Vec<_>>(),
     });
-    let taken = [Some(&args.out), args.png.as_ref()].into_iter().flatten().any(|p| p.as_os_str() == "-");
-    if !taken {
-        ui.result(&text, &object);
-    }
-    Ok(())
+    ui.result(&text, &object);
 }
 
 /// The scene in a file, `-` being stdin.
 pub(super) fn read_stage(path: &Path) -> Result<Stage, Failure> {
+    stage_of(&read_text(path)?, path)
+}
+
+/// The scene in the text of a file.
+pub(super) fn stage_of(text: &str, path: &Path) -> Result<Stage, Failure> {
     let base = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let spec =
-        SceneSpec::parse(&read_text(path)?, &path.display().to_string()).map_err(|e| match path.extension() {
-            Some(extension) if extension != "toml" => Failure::usage(format!(
-                "{e}\n(SCENE.toml describes a scene; a measurement or fit goes with --material)"
-            )),
-            _ => e.into(),
-        })?;
+    let spec = SceneSpec::parse(text, &path.display().to_string()).map_err(|e| match path.extension() {
+        Some(extension) if extension != "toml" => {
+            Failure::usage(format!("{e}\n(SCENE.toml describes a scene; a measurement or fit goes with --material)"))
+        }
+        _ => e.into(),
+    })?;
     Ok(Stage { spec, base })
 }
 

@@ -1,18 +1,33 @@
-//! More of what numbers side by side can do: comparisons and choices, roots, vectors of three, and the elementary functions that light transport
+//! Numbers side by side for long chains of steps: comparisons and choices, roots, vectors of three, and the elementary functions that light transport
 //! takes. All give the same bits on every machine.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use glam::DVec3;
 
-use super::simd::{self, Eight, LANES, Lanes, Simd};
+use super::simd::{self, Simd};
+
+/// Registers that stand for one number: while one waits for a result, the other works.
+const REGISTERS: usize = 2;
+/// Numbers side by side.
+pub const LANES: usize = REGISTERS * simd::LANES;
+/// A number for each lane.
+pub type Row = [f64; LANES];
+
+/// [`LANES`] numbers in registers.
+#[must_use]
+#[derive(Debug, Clone, Copy)]
+pub struct Lanes<S: Simd> {
+    simd: S,
+    v: [S::f64s; REGISTERS],
+}
 
 /// A yes or no for each lane.
 #[must_use]
 #[derive(Debug, Clone, Copy)]
 pub struct Mask<S: Simd> {
     simd: S,
-    m: S::m64s,
+    m: [S::m64s; REGISTERS],
 }
 
 impl<S: Simd> Mask<S> {
@@ -27,13 +42,14 @@ impl<S: Simd> Mask<S> {
     #[inline(always)]
     #[must_use]
     pub fn any(self) -> bool {
-        self.simd.first_true_m64s(self.m) < LANES
+        let any = self.m[1..].iter().fold(self.m[0], |any, m| self.simd.or_m64s(any, *m));
+        self.simd.first_true_m64s(any) < simd::LANES
     }
 
     /// `yes` where this says so, `no` elsewhere.
     #[inline(always)]
     pub fn select(self, yes: Lanes<S>, no: Lanes<S>) -> Lanes<S> {
-        Lanes { v: self.simd.select_f64s(self.m, yes.v, no.v), ..yes }
+        Lanes { v: std::array::from_fn(|k| self.simd.select_f64s(self.m[k], yes.v[k], no.v[k])), ..yes }
     }
 
     /// The same for vectors.
@@ -60,7 +76,7 @@ impl<S: Simd> BitAnd for Mask<S> {
 
     #[inline(always)]
     fn bitand(self, other: Self) -> Self {
-        Self { m: self.simd.and_m64s(self.m, other.m), ..self }
+        Self { m: std::array::from_fn(|k| self.simd.and_m64s(self.m[k], other.m[k])), ..self }
     }
 }
 
@@ -69,7 +85,7 @@ impl<S: Simd> BitOr for Mask<S> {
 
     #[inline(always)]
     fn bitor(self, other: Self) -> Self {
-        Self { m: self.simd.or_m64s(self.m, other.m), ..self }
+        Self { m: std::array::from_fn(|k| self.simd.or_m64s(self.m[k], other.m[k])), ..self }
     }
 }
 
@@ -78,7 +94,34 @@ impl<S: Simd> Not for Mask<S> {
 
     #[inline(always)]
     fn not(self) -> Self {
-        Self { m: self.simd.not_m64s(self.m), ..self }
+        Self { m: self.m.map(|m| self.simd.not_m64s(m)), ..self }
+    }
+}
+
+impl<S: Simd> Add for Lanes<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| self.simd.add_f64s(a, b))
+    }
+}
+
+impl<S: Simd> Sub for Lanes<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| self.simd.sub_f64s(a, b))
+    }
+}
+
+impl<S: Simd> Mul for Lanes<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(other, |a, b| self.simd.mul_f64s(a, b))
     }
 }
 
@@ -87,7 +130,7 @@ impl<S: Simd> Div for Lanes<S> {
 
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        Self { v: self.simd.div_f64s(self.v, other.v), ..self }
+        self.with(other, |a, b| self.simd.div_f64s(a, b))
     }
 }
 
@@ -96,15 +139,73 @@ impl<S: Simd> Neg for Lanes<S> {
 
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { v: self.simd.neg_f64s(self.v), ..self }
+        self.each(|v| self.simd.neg_f64s(v))
     }
 }
 
 impl<S: Simd> Lanes<S> {
+    /// The same number in every lane.
+    #[inline(always)]
+    pub fn splat(simd: S, x: f64) -> Self {
+        Self { simd, v: [simd.splat_f64s(x); REGISTERS] }
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub fn load(simd: S, from: &Row) -> Self {
+        let v = S::as_simd_f64s(from).0;
+        Self { simd, v: std::array::from_fn(|k| v[k]) }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub fn store(self, to: &mut Row) {
+        S::as_mut_simd_f64s(to).0.copy_from_slice(&self.v);
+    }
+
+    #[inline(always)]
+    fn each(self, f: impl Fn(S::f64s) -> S::f64s) -> Self {
+        Self { v: self.v.map(f), ..self }
+    }
+
+    #[inline(always)]
+    fn with(self, other: Self, f: impl Fn(S::f64s, S::f64s) -> S::f64s) -> Self {
+        Self { v: std::array::from_fn(|k| f(self.v[k], other.v[k])), ..self }
+    }
+
+    #[inline(always)]
+    fn compared(self, other: Self, f: impl Fn(S::f64s, S::f64s) -> S::m64s) -> Mask<S> {
+        Mask { simd: self.simd, m: std::array::from_fn(|k| f(self.v[k], other.v[k])) }
+    }
+
+    /// self·b + c, rounded once.
+    #[inline(always)]
+    pub fn mul_add(self, b: Self, c: Self) -> Self {
+        Self { v: std::array::from_fn(|k| self.simd.mul_add_f64s(self.v[k], b.v[k], c.v[k])), ..self }
+    }
+
+    /// |self|.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        self.each(|v| self.simd.abs_f64s(v))
+    }
+
+    /// The larger one; neither may be NaN.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        self.with(other, |a, b| self.simd.max_f64s(a, b))
+    }
+
+    /// The smaller one; neither may be NaN.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        self.with(other, |a, b| self.simd.min_f64s(a, b))
+    }
+
     /// The root; NaN below 0.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        Self { v: self.simd.sqrt_f64s(self.v), ..self }
+        self.each(|v| self.simd.sqrt_f64s(v))
     }
 
     /// The root of what is above 0, else 0.
@@ -116,19 +217,19 @@ impl<S: Simd> Lanes<S> {
     /// self > other; no where one is NaN.
     #[inline(always)]
     pub fn above(self, other: Self) -> Mask<S> {
-        Mask { simd: self.simd, m: self.simd.greater_than_f64s(self.v, other.v) }
+        self.compared(other, |a, b| self.simd.greater_than_f64s(a, b))
     }
 
     /// self ≥ other; no where one is NaN.
     #[inline(always)]
     pub fn at_least(self, other: Self) -> Mask<S> {
-        Mask { simd: self.simd, m: self.simd.greater_than_or_equal_f64s(self.v, other.v) }
+        self.compared(other, |a, b| self.simd.greater_than_or_equal_f64s(a, b))
     }
 
     /// self = other.
     #[inline(always)]
     pub fn is(self, other: Self) -> Mask<S> {
-        Mask { simd: self.simd, m: self.simd.equal_f64s(self.v, other.v) }
+        self.compared(other, |a, b| self.simd.equal_f64s(a, b))
     }
 
     /// What vectors are made with.
@@ -146,7 +247,7 @@ impl<S: Simd> Lanes<S> {
     /// ln(1 + x) for x > −1 ([`simd::ln_1p`]).
     #[inline(always)]
     pub fn ln_1p(self) -> Self {
-        let mut lanes: Eight = [0.0; LANES];
+        let mut lanes = [0.0; LANES];
         self.store(&mut lanes);
         for x in &mut lanes {
             *x = simd::ln_1p(*x);
@@ -174,7 +275,7 @@ impl<S: Simd> Lanes<S> {
     /// eˣ ([`simd::exp`]).
     #[inline(always)]
     pub fn exp(self) -> Self {
-        let mut lanes: Eight = [0.0; LANES];
+        let mut lanes = [0.0; LANES];
         self.store(&mut lanes);
         for x in &mut lanes {
             *x = simd::exp(*x);
@@ -207,27 +308,23 @@ impl<S: Simd> Lanes<S> {
         let (ax, ay) = (x.abs(), y.abs());
         let steep = ay.above(ax);
         let (low, high) = (steep.select(ax, ay), steep.select(ay, ax));
-        let ratio = high.above(self.number(0.0)).select(low / high, self.number(0.0));
-        let angle = ratio.arc_tangent();
+        // Above an eighth of a right angle, about the diagonal: |ratio| ≤ tan(π/8).
+        let diagonal = low.above(high * self.number(std::f64::consts::SQRT_2 - 1.0));
+        let (over, under) = (diagonal.select(low - high, low), diagonal.select(low + high, high));
+        let zero = self.number(0.0);
+        let ratio = under.above(zero).select(over / under, zero);
         let pi = std::f64::consts::PI;
+        let angle = ratio.arc_tangent() + diagonal.keep(self.number(0.25 * pi));
         let angle = steep.select(self.number(0.5 * pi) - angle, angle);
-        let angle = x.at_least(self.number(0.0)).select(angle, self.number(pi) - angle);
-        y.at_least(self.number(0.0)).select(angle, self.number(2.0 * pi) - angle)
+        let angle = x.at_least(zero).select(angle, self.number(pi) - angle);
+        y.at_least(zero).select(angle, self.number(2.0 * pi) - angle)
     }
 
-    /// The arc tangent of 0 to 1: about the nearest eighth, where that of the difference is a short series.
+    /// The arc tangent of what is at most tan(π/8).
     #[inline(always)]
     fn arc_tangent(self) -> Self {
-        let eighths = self * self.number(8.0);
-        let near = (eighths + self.number(ROUND) - self.number(ROUND)) * self.number(0.125);
-        let d = (self - near) / (self.number(1.0) + self * near);
-        let d2 = d * d;
-        let mut at: Eight = [0.0; LANES];
-        (near * self.number(8.0)).store(&mut at);
-        for x in &mut at {
-            *x = ARC_TANGENTS[*x as usize & 15];
-        }
-        d.mul_add(d2.horner(&ARC), Self::load(self.simd, &at))
+        let x2 = self * self;
+        (self * x2).mul_add(x2.horner(&ARC), self)
     }
 }
 
@@ -258,26 +355,19 @@ const COS: [f64; 10] = [
     -0.5,
     1.0,
 ];
-/// (−1)ᵏ/(2k + 1) from k = 6 down.
-const ARC: [f64; 7] = [1.0 / 13.0, -1.0 / 11.0, 1.0 / 9.0, -1.0 / 7.0, 1.0 / 5.0, -1.0 / 3.0, 1.0];
-/// Arc tangents of 0, ⅛ … 1, then nothing.
-const ARC_TANGENTS: [f64; 16] = [
-    0.0,
-    0.124_354_994_546_761_44,
-    0.244_978_663_126_864_15,
-    0.358_770_670_270_572_25,
-    0.463_647_609_000_806_1,
-    0.558_599_315_343_562_4,
-    0.643_501_108_793_284_4,
-    0.718_829_999_621_624_5,
-    std::f64::consts::FRAC_PI_4,
-    0.0,
-    0.0,
-    0.0,
-    0.0,
-    0.0,
-    0.0,
-    0.0,
+/// (atan(x)/x − 1)/x² to 5e-18 up to x = tan(π/8), in powers of x² from the tenth down: its interpolation at Chebyshev's points.
+const ARC: [f64; 11] = [
+    -0.019_175_404_711_104_935,
+    0.039_230_447_784_793_09,
+    -0.050_854_078_345_894_844,
+    0.058_581_409_048_663_28,
+    -0.066_645_105_255_089_36,
+    0.076_921_831_253_768_92,
+    -0.090_909_045_753_064_9,
+    0.111_111_110_151_870_18,
+    -0.142_857_142_846_656_82,
+    0.199_999_999_999_955_16,
+    -1.0 / 3.0,
 ];
 
 /// Vectors side by side.
@@ -432,7 +522,9 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> [f64; LANES] {
-            let x = Lanes::load(simd, &[-3.0, -0.0, 0.0, 1.0, 2.0, f64::NAN, f64::INFINITY, 5.0]);
+            let mut row = [5.0; LANES];
+            row[..8].copy_from_slice(&[-3.0, -0.0, 0.0, 1.0, 2.0, f64::NAN, f64::INFINITY, 5.0]);
+            let x = Lanes::load(simd, &row);
             let zero = x.number(0.0);
             let positive = x.above(zero);
             assert!(positive.any() && !Mask::splat(simd, false).any() && Mask::splat(simd, true).any());
@@ -448,6 +540,6 @@ mod tests {
     fn choices_are_made_lane_by_lane() {
         let out = vectorised(Choices);
         let want = [3.0, 0.0, 0.0, 1.0, f64::sqrt(2.0), 7.0, f64::INFINITY, f64::sqrt(5.0)];
-        assert_eq!(out.map(f64::abs), want);
+        assert_eq!(out.map(f64::abs)[..8], want);
     }
 }

@@ -10,16 +10,15 @@ use super::camera::Camera;
 use super::integrator::{PathResult, Strategy, Tracer, Watch};
 use super::layers::{Gathered, LayerSet, Sight, layer};
 use super::noise::{Noise, PictureError, relative_squares, standard_errors};
-use super::packet::{FlatScene, Found, Packets};
+use super::packet::{FlatScene, Packets};
 use super::pixel::Pixel;
 use super::plan::Plan;
-use super::points::{Draws, key_of};
+use super::points::{Draws, keys_of};
 use super::scene::{Scene, SceneSpec};
 use super::schedule::Schedule;
 use super::tiles::{TILE, TILE_ROOM, Tile, Tiles};
 use crate::control::Control;
 use crate::image::{Image, Metadata};
-use crate::numeric::simd::LANES;
 
 /// Samples that a tile's pixels get between two looks at the clock and the wish to stop.
 const PASS: u32 = 32;
@@ -113,6 +112,8 @@ pub struct Film {
     pub seconds: f64,
     /// Samples that were not finite; each of them leaves its pixel not finite. Always 0 but for a mistake of the program.
     pub not_finite: u64,
+    /// Rays that were sent out, those towards lights among them where something may hide these.
+    pub rays: u64,
     scene: String,
     plan: String,
     seed: u64,
@@ -253,6 +254,7 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         height: options.height,
         seconds: 0.0,
         not_finite: 0,
+        rays: 0,
         scene: scene.name.clone(),
         plan: in_words(scene, plan, options),
         seed: options.seed,
@@ -270,14 +272,16 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
     if !schedule.adapts() {
         control.progress.start("render", u64::from(options.samples) * tiles.count() as u64);
     }
-    let mut more = Some(schedule.first(if painter.packets.is_some() { LANES as u32 } else { 1 }));
+    let mut more = Some(schedule.first(if painter.packets.is_some() { 8 } else { 1 }));
     let mut state = String::new();
     while let Some(round) = more.take() {
         if schedule.adapts() {
             control.progress.start("render, next round", round.iter().map(|n| u64::from(*n)).sum());
             control.progress.tell(&state);
         }
-        film.not_finite += paint(&painter, &mut film, &schedule, &round, control);
+        let counts = paint(&painter, &mut film, &schedule, &round, control);
+        film.not_finite += counts.not_finite;
+        film.rays += counts.rays;
         schedule.advance(&round);
         let over = control.stop.requested() || schedule.deadline().is_some_and(|end| Instant::now() >= end);
         if !over {
@@ -323,26 +327,45 @@ fn in_words(scene: &Scene, plan: Plan, options: &Options) -> String {
     )
 }
 
-/// Adds so many samples to the pixels of every tile; the number of those that were not finite.
-fn paint(painter: &Painter<'_>, film: &mut Film, schedule: &Schedule, round: &[u32], control: Control<'_>) -> u64 {
+/// What is counted beside the picture.
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    /// Samples that were not finite.
+    not_finite: u64,
+    rays: u64,
+}
+
+impl Counts {
+    fn add(&mut self, path: &PathResult) {
+        self.not_finite += u64::from(!path.radiance.is_finite());
+        self.rays += u64::from(path.rays);
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self { not_finite: self.not_finite + other.not_finite, rays: self.rays + other.rays }
+    }
+}
+
+/// Adds so many samples to the pixels of every tile.
+fn paint(painter: &Painter<'_>, film: &mut Film, schedule: &Schedule, round: &[u32], control: Control<'_>) -> Counts {
     let tiles = film.tiles;
     let mut gathered: Vec<_> = film.gathered.chunks_mut(TILE_ROOM).map(Some).collect();
     gathered.resize_with(tiles.count(), || None);
     let deadline = schedule.deadline();
     let over = || control.stop.requested() || deadline.is_some_and(|end| Instant::now() >= end);
     let work = film.pixels.par_chunks_mut(TILE_ROOM).zip(gathered).enumerate();
-    let bad = work.map(|(i, (pixels, mut gathered))| {
+    let counts = work.map(|(i, (pixels, mut gathered))| {
         let (mut done, end) = (schedule.have()[i], schedule.have()[i] + round[i]);
-        let mut bad = 0;
+        let mut counts = Counts::default();
         while done < end && !over() {
             let pass = PASS.min(end - done);
-            bad += painter.paint(tiles.tile(i), pixels, gathered.as_deref_mut(), (done, pass));
+            counts = counts.and(painter.paint(tiles.tile(i), pixels, gathered.as_deref_mut(), (done, pass)));
             done += pass;
             control.progress.advance(u64::from(pass));
         }
-        bad
+        counts
     });
-    bad.sum()
+    counts.reduce(Counts::default, Counts::and)
 }
 
 /// Follows paths through the pixels of a tile.
@@ -354,8 +377,8 @@ struct Painter<'a> {
 }
 
 impl Painter<'_> {
-    /// Adds `samples` paths to every pixel of a tile whose pixels have `done`; the number of those that were not finite.
-    fn paint(&self, tile: Tile, pixels: &mut [Pixel], gathered: Option<&mut [Gathered]>, of: (u32, u32)) -> u64 {
+    /// Adds `samples` paths to every pixel of a tile whose pixels have `done`.
+    fn paint(&self, tile: Tile, pixels: &mut [Pixel], gathered: Option<&mut [Gathered]>, of: (u32, u32)) -> Counts {
         match (gathered, &self.packets) {
             (None, Some(packets)) => by_packets(packets, tile, pixels, of),
             (None, None) => self.one_by_one(tile, pixels, of, |_, (): &(), _| {}),
@@ -372,40 +395,36 @@ impl Painter<'_> {
         pixels: &mut [Pixel],
         (done, samples): (u32, u32),
         mut gather: impl FnMut(usize, &W, &PathResult),
-    ) -> u64 {
-        let mut bad = 0;
+    ) -> Counts {
+        let mut counts = Counts::default();
         for slot in tile.slots() {
             let (x, y) = (tile.x + slot % TILE, tile.y + slot / TILE);
-            let key = key_of(self.seed, x as u32, y as u32);
+            let keys = keys_of(self.seed, x as u32, y as u32);
             for sample in done..done + samples {
-                let draws = Draws::new(key, sample);
+                let draws = Draws::new(keys, sample);
                 let ray = self.camera.ray(x, y, draws);
                 let mut watch = W::default();
                 let path = self.tracer.trace(ray, draws, &mut watch);
                 debug_assert!(path.radiance.is_finite(), "pixel ({x}, {y}): radiance {}", path.radiance);
-                bad += u64::from(!path.radiance.is_finite());
+                counts.add(&path);
                 pixels[slot].add(&path);
                 gather(slot, &watch, &path);
             }
         }
-        bad
+        counts
     }
 }
 
-/// The same by packets: paths of the last that are too many don't count.
-fn by_packets(packets: &Packets<'_>, tile: Tile, pixels: &mut [Pixel], (done, samples): (u32, u32)) -> u64 {
-    let mut bad = 0;
-    let mut take = |slot: usize, packet: u32, found: &Found| {
-        let left = (samples as usize - packet as usize * LANES).min(LANES);
-        for ((r, g), b) in found[0].iter().zip(&found[1]).zip(&found[2]).take(left) {
-            let radiance = DVec3::new(*r, *g, *b);
-            debug_assert!(radiance.is_finite(), "tile at ({}, {}), {slot}: radiance {radiance}", tile.x, tile.y);
-            bad += u64::from(!radiance.is_finite());
-            pixels[slot].add(&PathResult { radiance, unknown: 0.0 });
-        }
+/// The same by packets.
+fn by_packets(packets: &Packets<'_>, tile: Tile, pixels: &mut [Pixel], (done, samples): (u32, u32)) -> Counts {
+    let mut not_finite = 0;
+    let mut take = |slot: usize, radiance: DVec3| {
+        debug_assert!(radiance.is_finite(), "tile at ({}, {}), {slot}: radiance {radiance}", tile.x, tile.y);
+        not_finite += u64::from(!radiance.is_finite());
+        pixels[slot].add(&PathResult { radiance, unknown: 0.0, rays: 0 });
     };
-    packets.tile(tile, done, samples.div_ceil(LANES as u32), &mut take);
-    bad
+    let rays = packets.tile(tile, done, samples, &mut take);
+    Counts { not_finite, rays }
 }
 
 #[cfg(test)]

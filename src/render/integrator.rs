@@ -50,6 +50,8 @@ pub struct PathResult {
     /// there, at most 1. So a gap of the surface that the camera sees counts in full, one that is seen by way of a dark surface
     /// little. A direction towards a light that something hides asks for nothing.
     pub unknown: f64,
+    /// Rays that it sent out, those towards lights among them.
+    pub rays: u32,
 }
 
 /// What somebody may want to know of a path beside its radiance. `()` wants nothing, and costs nothing.
@@ -95,6 +97,7 @@ struct Path {
     radiance: DVec3,
     throughput: DVec3,
     unknown: f64,
+    rays: u32,
 }
 
 impl Path {
@@ -113,9 +116,10 @@ impl<'a> Tracer<'a> {
 
     /// Follows one path that starts with `ray` at the camera.
     pub fn trace(&self, mut ray: Ray, draws: Draws, watch: &mut impl Watch) -> PathResult {
-        let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: 0.0 };
+        let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: 0.0, rays: 0 };
         let mut last: Option<Scatter> = None;
         for bounce in 0..=self.events {
+            path.rays += 1;
             let Some(surface) = self.scene.geometry.closest(&ray) else {
                 path.radiance += path.throughput * self.environment_found(&ray, last.as_ref());
                 break;
@@ -154,7 +158,7 @@ impl<'a> Tracer<'a> {
             ray = Ray::new(vertex.point.above(), next.0);
             last = Some(next.1);
         }
-        PathResult { radiance: path.radiance, unknown: path.unknown }
+        PathResult { radiance: path.radiance, unknown: path.unknown, rays: path.rays }
     }
 
     /// The numbers of a decision.
@@ -163,7 +167,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// Whether something lies on a segment towards a light.
-    fn hides(&self, segment: &Ray) -> bool {
+    fn hides(&self, segment: &Ray, path: &mut Path) -> bool {
+        path.rays += u32::from(self.plan.shadows);
         self.plan.shadows && self.scene.geometry.occluded(segment)
     }
 
@@ -186,7 +191,8 @@ impl<'a> Tracer<'a> {
         let brdf = match material {
             Material::Black => return None,
             Material::PhongEquation(equation) => {
-                path.radiance += path.throughput * self.shade(equation, vertex);
+                let shaded = self.shade(equation, vertex, path);
+                path.radiance += path.throughput * shaded;
                 return None;
             }
             Material::Brdf(brdf) => brdf.as_ref(),
@@ -227,7 +233,7 @@ impl<'a> Tracer<'a> {
             && self.strategy != Strategy::MaterialOnly
         {
             let u = self.draws_at(draws, bounce, Decision::Environment).pair();
-            let sky = environment.sample(&vertex.frame, u);
+            let Some(sky) = environment.sample(&vertex.frame, u) else { return };
             let irradiance = sky.radiance / sky.pdf;
             if irradiance.is_finite() {
                 let reflected = self.reflected(brdf, vertex, sky.wi, Some(sky.pdf));
@@ -239,7 +245,7 @@ impl<'a> Tracer<'a> {
     /// Adds what is reflected of the irradiance that arrives along `shadow`, where nothing is in its way.
     fn add_unhidden(&self, reflected: Option<DVec3>, shadow: &Ray, irradiance: DVec3, path: &mut Path) {
         let matters = irradiance != DVec3::ZERO && reflected != Some(DVec3::ZERO);
-        if !matters || self.hides(shadow) {
+        if !matters || self.hides(shadow, path) {
             return;
         }
         match reflected {
@@ -285,13 +291,13 @@ impl<'a> Tracer<'a> {
     }
 
     /// Phong's equation at the vertex.
-    fn shade(&self, equation: &PhongEquation, vertex: &Vertex) -> DVec3 {
+    fn shade(&self, equation: &PhongEquation, vertex: &Vertex, path: &mut Path) -> DVec3 {
         let mut radiance = equation.ambient;
         for light in &self.scene.lights {
             let Some(segment) = light.as_seen_by_equation(&vertex.point) else { continue };
             let term = equation.light_term(vertex.frame.to_local(segment.direction), vertex.wo);
             let above = vertex.point.normal.dot(segment.direction) > 0.0;
-            if above && term != DVec3::ZERO && !self.hides(&segment) {
+            if above && term != DVec3::ZERO && !self.hides(&segment, path) {
                 radiance += term;
             }
         }

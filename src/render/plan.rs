@@ -126,7 +126,7 @@ fn why_environment(scene: &Scene) -> &'static str {
     match &scene.environment {
         None => "there is none",
         Some(Environment::Constant(_)) => "even",
-        Some(Environment::Image(_)) => "a picture, sampled by its radiance",
+        Some(Environment::Image(_)) => "a picture, sampled by its light times the cosine",
     }
 }
 

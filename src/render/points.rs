@@ -11,14 +11,12 @@ use glam::DVec2;
 
 use crate::numeric::random::mix;
 
-/// The points of some samples of one pixel, side by side.
+/// The points of some samples, side by side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Points<const N: usize> {
-    /// Those of the halves.
-    keys: [u64; 2],
-    /// The half of the first sample; the others' alternate.
-    half: usize,
-    /// The samples' places in their halves' sequences.
+    /// Those of the samples' halves.
+    keys: [u64; N],
+    /// Their places in the halves' sequences.
     places: [u32; N],
 }
 
@@ -28,21 +26,18 @@ pub(super) fn half_of(sample: u32) -> usize {
     (sample & 1) as usize
 }
 
-/// The key of a pixel's points.
+/// The keys of both halves of a pixel's points.
 #[inline(always)]
-pub(super) fn key_of(seed: u64, x: u32, y: u32) -> u64 {
-    mix(mix(seed ^ 0x51ed_270b_7a11_4e17).wrapping_add(u64::from(y) << 32 | u64::from(x)))
+pub(super) fn keys_of(seed: u64, x: u32, y: u32) -> [u64; 2] {
+    let key = mix(mix(seed ^ 0x51ed_270b_7a11_4e17).wrapping_add(u64::from(y) << 32 | u64::from(x)));
+    [key, mix(key ^ 0x2545_f491_4f6c_dd1d)]
 }
 
 impl<const N: usize> Points<N> {
-    /// The points of N samples from `first` on of the pixel with this key.
+    /// The points of samples at these places of the halves with these keys.
     #[inline(always)]
-    pub fn new(key: u64, first: u32) -> Self {
-        let mut places = [0; N];
-        for (k, place) in places.iter_mut().enumerate() {
-            *place = first.wrapping_add(k as u32) >> 1;
-        }
-        Self { keys: [key, mix(key ^ 0x2545_f491_4f6c_dd1d)], half: half_of(first), places }
+    pub fn of(keys: [u64; N], places: [u32; N]) -> Self {
+        Self { keys, places }
     }
 
     /// Both coordinates of the points of a decision, above 0 and below 1.
@@ -65,12 +60,9 @@ impl<const N: usize> Points<N> {
     fn seeds(&self, decision: u32) -> ([u32; N], [u32; N], [u32; N]) {
         let step = u64::from(decision).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let (mut order, mut first, mut second) = ([0; N], [0; N], [0; N]);
-        for half in 0..N.min(2) {
-            let key = mix(self.keys[(self.half + half) & 1].wrapping_add(step));
-            let other = mix(key);
-            for k in (half..N).step_by(2) {
-                (order[k], first[k], second[k]) = (key as u32, (key >> 32) as u32, other as u32);
-            }
+        for k in 0..N {
+            let key = mix(self.keys[k].wrapping_add(step));
+            (order[k], first[k], second[k]) = (key as u32, (key >> 32) as u32, mix(key) as u32);
         }
         (order, first, second)
     }
@@ -120,9 +112,9 @@ pub(super) struct Draws {
 }
 
 impl Draws {
-    /// Those of a sample of the pixel with this key, at the first decision.
-    pub fn new(key: u64, sample: u32) -> Self {
-        Self { points: Points::new(key, sample), decision: 0 }
+    /// Those of a sample of the pixel with these keys, at the first decision.
+    pub fn new(keys: [u64; 2], sample: u32) -> Self {
+        Self { points: Points::of([keys[half_of(sample)]], [sample >> 1]), decision: 0 }
     }
 
     /// The same at another decision.
@@ -203,10 +195,11 @@ mod tests {
     #[test]
     fn points_are_nets() {
         for key in [1u64, 77, 1 << 40] {
+            let keys = keys_of(key, 3, 5);
             for decision in [0, 1, 9] {
                 for m in [3u32, 6, 10] {
                     let n = 1u32 << m;
-                    let point = |half| move |k: u32| Points::<1>::new(key, 2 * k + half).pair(decision);
+                    let point = |half: usize| move |k: u32| Points::of([keys[half]], [k]).pair(decision);
                     for list in [0, 1].map(|half| (0..n).map(point(half)).collect::<Vec<_>>()) {
                         for across in 0..=m {
                             let mut counts = vec![0; n as usize];
@@ -228,9 +221,15 @@ mod tests {
 
     #[test]
     fn eight_abreast_are_those_of_one_at_a_time() {
-        let (x, y) = Points::<8>::new(5, 16).pair(3);
+        let keys: [_; 8] = std::array::from_fn(|k| keys_of(5, k as u32, 9));
+        let sample = |k: usize| 16 + 3 * k as u32;
+        let points = Points::<8>::of(
+            std::array::from_fn(|k| keys[k][half_of(sample(k))]),
+            std::array::from_fn(|k| sample(k) >> 1),
+        );
+        let (x, y) = points.pair(3);
         for k in 0..8 {
-            let draws = Draws::new(5, 16 + k as u32).at(3);
+            let draws = Draws::new(keys[k], sample(k)).at(3);
             assert_eq!(draws.pair(), DVec2::new(x[k], y[k]));
             assert_eq!(draws.single(), x[k]);
         }
@@ -241,9 +240,9 @@ mod tests {
     fn scramblings_are_independent() {
         let n = 20_000;
         let draw = |key: u64| {
-            let points = Points::<8>::new(mix(key), 0);
+            let points = Points::of(keys_of(key, 0, 0), [3, 3]);
             let ((a, b), (c, _)) = (points.pair(0), points.pair(1));
-            [a[6], b[6], c[6], a[7]]
+            [a[0], b[0], c[0], a[1]]
         };
         let list: Vec<[f64; 4]> = (0..n).map(draw).collect();
         let mean = |f: &dyn Fn(&[f64; 4]) -> f64| list.iter().map(f).sum::<f64>() / n as f64;

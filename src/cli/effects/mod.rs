@@ -9,7 +9,7 @@ mod of_scene;
 
 use super::failure::Failure;
 use super::output::read_text;
-use super::render::{parse_size, read_stage};
+use super::render::{parse_size, stage_of};
 use super::simulation::{Plan, What};
 use super::ui::Ui;
 use crate::chain::{self, Stage};
@@ -67,8 +67,9 @@ fn scene(args: &Args) -> Result<Option<Stage>, Failure> {
     if path == Path::new("-") {
         return Ok(None); // a simulation: stdin can be read only once
     }
-    let is_scene = read_text(path)?.parse::<toml::Table>().is_ok_and(|table| table.contains_key("camera"));
-    if is_scene { Ok(Some(read_stage(path)?)) } else { Ok(None) }
+    let text = read_text(path)?;
+    let is_scene = text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("camera"));
+    if is_scene { Ok(Some(stage_of(&text, path)?)) } else { Ok(None) }
 }
 
 /// Effects that are on with their numbers, then those that are off with the reason; no wider than 100 columns.

@@ -9,8 +9,8 @@ use super::super::lights::QuadLight;
 use super::flat::Lobes;
 use super::shapes::Points3;
 use crate::brdf::phong;
-use crate::numeric::lanes::Vec3;
-use crate::numeric::simd::{Eight, LANES, Lanes, Simd};
+use crate::numeric::lanes::{LANES, Lanes, Row, Vec3};
+use crate::numeric::simd::Simd;
 
 /// ∫ cosθ dω over what is above the horizon of a quad that shines towards the points and that nothing hides: the irradiance
 /// for radiance 1 (Lambert 1760: half the sum over edges of the angle that an edge fills times the cosine of its plane's normal).
@@ -99,7 +99,7 @@ impl Surround {
     /// The albedo for light towards directions of these cosines, above 0: cubic between four values (Catmull, Rom 1974).
     #[inline(always)]
     pub fn albedo<S: Simd>(&self, cos: Lanes<S>) -> Vec3<S> {
-        let mut at: Eight = [0.0; LANES];
+        let mut at: Row = [0.0; LANES];
         (cos.sqrt() * cos.number(STEPS as f64)).store(&mut at);
         let mut found = [[0.0; LANES]; 3];
         for (k, x) in at.iter().enumerate() {

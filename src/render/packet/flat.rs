@@ -155,6 +155,12 @@ impl<'a> FlatScene<'a> {
         Some(Surround::new(material))
     }
 
+    /// Whether a surface of this owner, a material, has Phong lobes.
+    #[inline(always)]
+    pub(super) fn is_glossy(&self, owner: OwnerNumber) -> bool {
+        self.materials.get(owner as usize).is_some_and(|material| !material.phong.is_empty())
+    }
+
     /// The lights that have a surface, with their indices.
     pub(super) fn shining(&self) -> impl Iterator<Item = (usize, &'a QuadLight)> {
         self.lights.iter().enumerate().filter_map(|(i, light)| match light {

@@ -4,8 +4,8 @@ use glam::DVec2;
 
 use super::super::lights::{QuadLight, SMALL_SOLID_ANGLE};
 use super::shapes::{Points3, Rays};
-use crate::numeric::lanes::{Mask, Vec3};
-use crate::numeric::simd::{Lanes, Simd};
+use crate::numeric::lanes::{Lanes, Mask, Vec3};
+use crate::numeric::simd::Simd;
 
 /// Light from one direction a lane.
 #[derive(Debug, Clone, Copy)]
@@ -16,8 +16,8 @@ pub(super) struct Arrivals<S: Simd> {
     pub shadow: Rays<S>,
     /// What a surface facing the light has of the light's strength: 1/r² or 1/density.
     pub strength: Lanes<S>,
-    /// Density of the direction, 1/sr.
-    pub pdf: Lanes<S>,
+    /// 1/density of the direction, sr; 0 where there is only one direction.
+    pub spread: Lanes<S>,
 }
 
 /// Segments between points.
@@ -26,12 +26,6 @@ pub(super) fn between<S: Simd>(from: Vec3<S>, to: Vec3<S>) -> Rays<S> {
     let way = to - from;
     let distance = way.length_squared().sqrt();
     Rays { origin: from, direction: way * (distance.number(1.0) / distance), t_max: distance }
-}
-
-/// y/√(y² + d²).
-#[inline(always)]
-fn sine<S: Simd>(y: Lanes<S>, d2: Lanes<S>) -> Lanes<S> {
-    y / y.mul_add(y, d2).sqrt()
 }
 
 /// The complex number whose argument is the angle between the planes of two edges, x and y their distances from the foot point.
@@ -59,7 +53,6 @@ struct View<S: Simd> {
     high: [Lanes<S>; 2],
     height: Lanes<S>,
     start: Lanes<S>,
-    normal_z: [Lanes<S>; 2],
     solid_angle: Lanes<S>,
 }
 
@@ -72,34 +65,39 @@ impl<S: Simd> View<S> {
         let (cx, cy) = (d.dot(d.vector(x)), d.dot(d.vector(y)));
         let half = [cx.number(0.5 * length.x), cx.number(0.5 * length.y)];
         let (low, high) = ([cx - half[0], cy - half[1]], [cx + half[0], cy + half[1]]);
-        let h2 = height * height;
         let right = sum(corner(high[0], low[1], height), corner(-high[0], high[1], height));
         let left = sum(corner(low[0], high[1], height), corner(-low[0], low[1], height));
         let start = height.number(std::f64::consts::TAU) - left;
-        let normal_z = [-sine(low[1], h2), sine(high[1], h2)];
-        Self { low, high, height, start, normal_z, solid_angle: right - start }
+        Self { low, high, height, start, solid_angle: right - start }
     }
 
-    /// Coordinates along both edges from the foot point, uniform in solid angle.
+    /// Coordinates along both edges from the foot point, uniform in solid angle. With few roots and quotients, which take longest.
     #[inline(always)]
     fn sample(&self, (u, v): (Lanes<S>, Lanes<S>)) -> (Lanes<S>, Lanes<S>) {
+        let one = u.number(1.0);
         let h2 = self.height * self.height;
-        let tau = u.number(std::f64::consts::TAU);
-        let turns = u.mul_add(self.solid_angle, self.start) / tau;
+        let (y0, y1) = (self.low[1], self.high[1]);
+        let turns = u.mul_add(self.solid_angle, self.start) * u.number(1.0 / std::f64::consts::TAU);
         // 2π itself is 0.
-        let turns = turns.at_least(u.number(1.0)).select(turns - u.number(1.0), turns);
+        let turns = turns.at_least(one).select(turns - one, turns);
         let (sin, cos) = turns.sin_cos_turns();
-        let f = cos.mul_add(self.normal_z[0], -self.normal_z[1]) / sin;
-        let y0 = self.low[1];
-        let flat = f.mul_add(f, -(h2 / y0.mul_add(y0, h2))).sqrt_nonneg();
-        let x = (self.height.with_sign(f) / flat).min(self.high[0]).max(self.low[0]);
+        let (q0, q1) = (y0.mul_add(y0, h2), y1.mul_add(y1, h2));
+        let m = cos.mul_add(y0, y1 * (q0 / q1).sqrt());
+        let rest = m.mul_add(m, -(h2 * sin * sin)).max(u.number(NOTHING));
+        let x = (self.height * sin * (q0 / rest).sqrt()).with_sign(-(m * sin));
+        let x = x.min(self.high[0]).max(self.low[0]);
         let d2 = x.mul_add(x, h2);
-        let (a, b) = (sine(self.low[1], d2), sine(self.high[1], d2));
+        let (r0, r1) = (y0.mul_add(y0, d2).sqrt(), y1.mul_add(y1, d2).sqrt());
+        let per = one / (r0 * r1);
+        let (a, b) = (y0 * r1 * per, y1 * r0 * per);
         let s = v.mul_add(b - a, a);
-        let y = s * (d2 / (u.number(1.0) - s * s)).sqrt();
-        (x, y.min(self.high[1]).max(self.low[1]))
+        let y = s * (d2 / (one - s * s)).sqrt();
+        (x, y.min(y1).max(y0))
     }
 }
+
+/// So little that what is divided by it leaves the light, and is finite.
+const NOTHING: f64 = 1e-250;
 
 /// Light of a quad at points, by a point (u, v) of the unit square.
 #[inline(always)]
@@ -128,30 +126,32 @@ pub(super) fn from_quad<S: Simd>(light: &QuadLight, at: &Points3<S>, u: (Lanes<S
         normal: from.vector(quad.normal),
     };
     let shadow = between(at.above(), end.above());
-    let pdf = wide.select(one / solid_angle, area_pdf(light, from, target));
-    let strength = one / pdf;
-    let finite = zero.number(f64::MAX).at_least(strength);
-    Arrivals { some: before & finite, shadow, strength, pdf }
+    let mut spread = solid_angle;
+    if (before & !wide).any() {
+        spread = wide.select(solid_angle, area_spread(light, from, target));
+    }
+    let finite = zero.number(f64::MAX).at_least(spread);
+    Arrivals { some: before & finite, shadow, strength: spread, spread }
 }
 
-/// Densities (1/sr) of directions from `from` to points `to` of the quad.
+/// 1/density (sr) of directions from `from` to points `to` of the quad.
 #[inline(always)]
-pub(super) fn quad_pdf<S: Simd>(light: &QuadLight, from: Vec3<S>, to: Vec3<S>) -> Lanes<S> {
-    let by_area = area_pdf(light, from, to);
+pub(super) fn quad_spread<S: Simd>(light: &QuadLight, from: Vec3<S>, to: Vec3<S>) -> Lanes<S> {
+    let by_area = area_spread(light, from, to);
     match light.rectangle() {
         None => by_area,
         Some((axes, length)) => {
             let solid_angle = View::new(light, axes, length, from).solid_angle;
-            let wide = solid_angle.above(by_area.number(SMALL_SOLID_ANGLE));
-            wide.select(by_area.number(1.0) / solid_angle, by_area)
+            solid_angle.above(by_area.number(SMALL_SOLID_ANGLE)).select(solid_angle, by_area)
         }
     }
 }
 
+/// The same for points uniform in area.
 #[inline(always)]
-fn area_pdf<S: Simd>(light: &QuadLight, from: Vec3<S>, to: Vec3<S>) -> Lanes<S> {
+fn area_spread<S: Simd>(light: &QuadLight, from: Vec3<S>, to: Vec3<S>) -> Lanes<S> {
     let quad = light.quad();
     let d = to - from;
     let distance2 = d.length_squared();
-    distance2 * distance2.sqrt() / (d.dot(d.vector(quad.normal)).abs() * distance2.number(quad.area))
+    d.dot(d.vector(quad.normal)).abs() * distance2.number(quad.area) / (distance2 * distance2.sqrt())
 }

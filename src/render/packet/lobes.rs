@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 use super::flat::{FlatScene, MOST_LOBES};
-use crate::numeric::lanes::{Mask, Vec3};
-use crate::numeric::simd::{Lanes, Simd};
+use crate::numeric::lanes::{Lanes, Mask, Vec3};
+use crate::numeric::simd::Simd;
 
 /// A Phong lobe of each lane's material.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,8 @@
-//! Eight paths of a pixel at a time, on the vector units.
+//! Eight paths at a time, on the vector units.
 //!
 //! What [`super::integrator`] does one path at a time, for scenes of spheres, planes and quads whose materials are sums of lobes; both are the same
-//! estimator (lights aimed at and met, power heuristic, roulette), so pictures agree within their noise; where light has a closed form, it takes no samples ([`closed`]). A path that ends waits for its fellows.
+//! estimator (lights aimed at and met, power heuristic, roulette), so pictures agree within their noise; where light has a closed form, it takes no samples ([`closed`]). Paths are
+//! followed by waves, event by event; those that have ended make room for the others ([`wave`]).
 
 mod closed;
 mod flat;
@@ -10,6 +11,8 @@ mod lobes;
 mod occluders;
 mod path;
 mod shapes;
+mod steps;
+mod wave;
 
 pub(super) use flat::FlatScene;
-pub(super) use path::{Found, Packets};
+pub(super) use path::Packets;

@@ -6,8 +6,8 @@ use super::super::ray::gamma;
 use super::super::shapes::Sphere;
 use super::flat::{FlatScene, Piece};
 use super::occluders::Occluders;
-use crate::numeric::lanes::{Mask, Vec3};
-use crate::numeric::simd::{Lanes, Simd};
+use crate::numeric::lanes::{Lanes, Mask, Vec3};
+use crate::numeric::simd::Simd;
 
 /// Rays: origin + t·direction for t in (0, `t_max`).
 #[derive(Debug, Clone, Copy)]

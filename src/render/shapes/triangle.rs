@@ -10,7 +10,8 @@ use crate::numeric::float::diff_of_products;
 pub struct ShearedRay {
     origin: DVec3,
     direction: DVec3,
-    axes: [usize; 3],
+    /// Its longest axis, which becomes z.
+    axis: usize,
     shear: DVec3,
 }
 
@@ -18,19 +19,16 @@ impl ShearedRay {
     /// The shear of a ray.
     pub fn new(ray: &Ray) -> Self {
         let d = ray.direction;
-        let z = d.abs().max_position();
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        // The two other axes change places where d runs backwards, which keeps the winding.
-        let axes = if d[z] < 0.0 { [y, x, z] } else { [x, y, z] };
-        let shear = DVec3::new(d[axes[0]] / d[z], d[axes[1]] / d[z], 1.0 / d[z]);
-        Self { origin: ray.origin, direction: d, axes, shear }
+        let axis = d.abs().max_position();
+        let along = turned(d, axis);
+        let shear = DVec3::new(along.x / along.z, along.y / along.z, 1.0 / along.z);
+        Self { origin: ray.origin, direction: d, axis, shear }
     }
 
     #[inline]
     fn apply(&self, p: DVec3) -> DVec3 {
-        let q = p - self.origin;
-        let [x, y, z] = self.axes;
-        DVec3::new(q[x] - self.shear.x * q[z], q[y] - self.shear.y * q[z], self.shear.z * q[z])
+        let q = turned(p - self.origin, self.axis);
+        DVec3::new(q.x - self.shear.x * q.z, q.y - self.shear.y * q.z, self.shear.z * q.z)
     }
 
     /// Where in (0, `t_max`) the ray meets the triangle, from either side: (t, b1, b2) with the barycentric coordinates of the
@@ -62,6 +60,16 @@ impl ShearedRay {
         );
         let (ahead, along) = (normal.dot(*a - self.origin), normal.dot(self.direction));
         (ahead > 0.0 && along > 0.0) || (ahead < 0.0 && along < 0.0)
+    }
+}
+
+/// The axes in turn, so that this one becomes z. The winding stays; a ray that runs backwards sees it reversed, and both sides are met.
+#[inline]
+fn turned(v: DVec3, axis: usize) -> DVec3 {
+    match axis {
+        0 => DVec3::new(v.y, v.z, v.x),
+        1 => DVec3::new(v.z, v.x, v.y),
+        _ => v,
     }
 }
 

@@ -10,11 +10,11 @@ use glam::DVec2;
 use super::super::pick::pick;
 use super::lat_long::{LatLong, Place};
 
-/// Sums over the cells of a picture, in the order in which they are searched.
+/// Sums over the cells of a picture.
 #[derive(Debug)]
 pub struct Density {
-    /// Running sum over the rows of cells, W/m².
-    rows: Vec<f64>,
+    /// ∫ brightness dω, W/m².
+    total: f64,
     /// Running sums of the mean corner along each row of cells, W/(sr·m²).
     cells: Vec<f64>,
 }
@@ -25,7 +25,7 @@ pub type Corners = [f64; 4];
 impl Density {
     /// The density of a grid whose cells have these corners.
     pub fn new(grid: &LatLong, corners: impl Fn(usize, usize) -> Corners) -> Self {
-        let (mut rows, mut total) = (Vec::with_capacity(grid.height - 1), 0.0);
+        let mut total = 0.0;
         let mut cells = Vec::with_capacity(grid.width * (grid.height - 1));
         for row in 0..grid.height - 1 {
             let mut sum = 0.0;
@@ -34,14 +34,13 @@ impl Density {
                 cells.push(sum);
             }
             total += sum * grid.solid_angle(row);
-            rows.push(total);
         }
-        Self { rows, cells }
+        Self { total, cells }
     }
 
     /// ∫ brightness dω, W/m²; 0 where the picture is black.
     pub fn total(&self) -> f64 {
-        self.rows.last().copied().unwrap_or(0.0)
+        self.total
     }
 
     /// Density at a place, per sr.
@@ -53,15 +52,52 @@ impl Density {
         (lerp(lerp(a, b, place.x), lerp(c, d, place.x), place.s)) / self.total()
     }
 
-    /// Column, row, and the coordinates x and s of a place drawn with two numbers in [0, 1).
+    /// Light of a block of cells, columns and rows without their ends, W/m².
+    pub fn light(&self, grid: &LatLong, columns: (usize, usize), rows: (usize, usize)) -> f64 {
+        (rows.0..rows.1).map(|row| self.of_row(grid, columns, row)).sum()
+    }
+
+    /// Sums along a row up to and before some of its cells.
+    fn sums(&self, grid: &LatLong, columns: (usize, usize), row: usize) -> (&[f64], f64) {
+        let row = self.cells.get(row * grid.width..(row + 1) * grid.width).unwrap_or_default();
+        let before = if columns.0 == 0 { 0.0 } else { row.get(columns.0 - 1).copied().unwrap_or(0.0) };
+        (row.get(columns.0..columns.1).unwrap_or_default(), before)
+    }
+
+    fn of_row(&self, grid: &LatLong, columns: (usize, usize), row: usize) -> f64 {
+        let (sums, before) = self.sums(grid, columns, row);
+        (sums.last().copied().unwrap_or(before) - before) * grid.solid_angle(row)
+    }
+
+    /// The row of a block in which the share u of its light lies, and how far through it, 0 to 1.
+    fn pick_row(&self, grid: &LatLong, columns: (usize, usize), rows: (usize, usize), u: f64) -> (usize, f64) {
+        let target = u * self.light(grid, columns, rows);
+        let (mut above, mut last) = (0.0, (rows.0, 0.0));
+        for row in rows.0..rows.1 {
+            let here = self.of_row(grid, columns, row);
+            if here > 0.0 {
+                last = (row, ((target - above) / here).clamp(0.0, 1.0));
+                if target < above + here {
+                    break;
+                }
+            }
+            above += here;
+        }
+        last
+    }
+
+    /// Column, row, and the coordinates x and s of a place in a block of cells drawn with two numbers in [0, 1).
     pub fn sample(
         &self,
         grid: &LatLong,
         corners: impl Fn(usize, usize) -> Corners,
+        (columns, rows): ((usize, usize), (usize, usize)),
         u: DVec2,
     ) -> (usize, usize, f64, f64) {
-        let (row, s) = pick(&self.rows, u.x);
-        let (column, x) = pick(self.cells.get(row * grid.width..(row + 1) * grid.width).unwrap_or_default(), u.y);
+        let (row, s) = self.pick_row(grid, columns, rows, u.x);
+        let (sums, before) = self.sums(grid, columns, row);
+        let (column, x) = pick(sums, before, u.y);
+        let column = column + columns.0;
         if at_pole(grid, row) {
             return (column, row, x, s);
         }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
+use super::above::{Above, Drawn};
 use super::density::{Corners, Density};
 use super::lat_long::{LatLong, Place};
 use crate::image::{ColorGrid, read_exr_colors};
@@ -20,6 +21,7 @@ pub struct EnvironmentImage {
     /// What a pixel's value is multiplied by, at least 0.
     scale: f64,
     density: Density,
+    above: Above,
 }
 
 impl EnvironmentImage {
@@ -38,22 +40,50 @@ impl EnvironmentImage {
         check(path, &picture)?;
         let grid = LatLong::new(picture.width, picture.height, turn);
         let density = Density::new(&grid, |column, row| corners(&grid, &picture.pixels, column, row).map(brightness));
-        let shines = density.total() > 0.0 && scale > 0.0;
-        Ok(shines.then_some(Self { grid, pixels: picture.pixels, scale, density }))
+        if !(density.total() > 0.0 && scale > 0.0) {
+            return Ok(None);
+        }
+        let above = Above::new(&grid, |columns, rows| density.light(&grid, columns, rows) / density.total());
+        Ok(Some(Self { grid, pixels: picture.pixels, scale, density, above }))
     }
 
-    /// Radiance from a unit direction, W/(sr·m²), and the density with which it is sampled, 1/sr.
-    pub fn find(&self, direction: DVec3) -> (DVec3, f64) {
+    /// Radiance from a unit direction, W/(sr·m²).
+    pub fn radiance(&self, direction: DVec3) -> DVec3 {
         let place = self.grid.place(direction);
-        let at = corners(&self.grid, &self.pixels, place.column, place.row);
-        (self.scale * bilinear(at, &place), self.density.pdf(&self.grid, &place, at.map(brightness)))
+        self.scale * bilinear(corners(&self.grid, &self.pixels, place.column, place.row), &place)
     }
 
-    /// A unit direction drawn with two numbers in [0, 1).
-    pub fn sample(&self, u: DVec2) -> DVec3 {
+    /// The same, and the density (1/sr) with which [`EnvironmentImage::sample`] draws it for a surface with a unit normal.
+    pub fn find(&self, normal: DVec3, direction: DVec3) -> (DVec3, f64) {
+        let place = self.grid.place(direction);
+        let drawn = self.above.find(&self.grid, normal, place.column, place.row);
+        self.found(&place, &drawn)
+    }
+
+    fn found(&self, place: &Place, drawn: &Drawn) -> (DVec3, f64) {
+        let at = corners(&self.grid, &self.pixels, place.column, place.row);
+        // In proportion to the radiance within the block.
+        let by_radiance = self.density.pdf(&self.grid, place, at.map(brightness));
+        let share = self.density.light(&self.grid, drawn.columns, drawn.rows) / self.density.total();
+        let pdf = if by_radiance > 0.0 { by_radiance / share * drawn.probability } else { 0.0 };
+        (self.scale * bilinear(at, place), pdf)
+    }
+
+    /// A unit direction drawn with two numbers in [0, 1), about in proportion to the radiance times the cosine at a surface with a
+    /// unit normal; the radiance, and the density, 1/sr. `None` where no light reaches the surface.
+    pub fn sample(&self, normal: DVec3, u: DVec2) -> Option<(DVec3, DVec3, f64)> {
+        let drawn = self.above.draw(&self.grid, normal, u)?;
         let at = |column, row| -> Corners { corners(&self.grid, &self.pixels, column, row).map(brightness) };
-        let (column, row, x, s) = self.density.sample(&self.grid, at, u);
-        self.grid.direction(column, row, x, s)
+        let (column, row, x, s) = self.density.sample(&self.grid, at, (drawn.columns, drawn.rows), drawn.u);
+        let direction = self.grid.direction(column, row, x, s);
+        // Radiance and density of the direction as it was rounded, so that their ratio is bounded.
+        let place = self.grid.place(direction);
+        let (radiance, pdf) = if (place.column, place.row) == (column, row) {
+            self.found(&place, &drawn)
+        } else {
+            self.find(normal, direction)
+        };
+        Some((direction, radiance, pdf))
     }
 }
 
@@ -116,6 +146,52 @@ mod tests {
         })
     }
 
+    fn any_direction(rng: &mut Stream) -> DVec3 {
+        crate::geometry::sampling::uniform_sphere(DVec2::new(rng.random(), rng.random()))
+    }
+
+    /// Samples over their density are even where all light is from above: a sky of small patches, which the tree follows one by one.
+    #[test]
+    fn a_lit_surface_is_sampled_evenly() {
+        let mut rng = stream(8, Purpose::Study, 0);
+        // Light about the zenith alone, within 40°, some of it 10⁴ as bright.
+        let sky = picture(64, 33, |i, j| {
+            [if j > 7 {
+                0.0
+            } else if (i, j) == (9, 4) {
+                1e4
+            } else {
+                1.0 + (i % 3) as f32
+            }; 3]
+        });
+        let sky = environment(sky, 0.7);
+        for tilt in [0.0, 0.3, 0.7] {
+            let normal = DVec3::new(f64::sin(tilt), f64::cos(tilt), 0.0);
+            let of = |_| {
+                let (d, radiance, pdf) = sky.sample(normal, DVec2::new(rng.random(), rng.random())).expect("lit");
+                radiance.x * d.dot(normal) / pdf
+            };
+            let list: Vec<f64> = (0..20_000).map(of).collect();
+            let mean = list.iter().sum::<f64>() / list.len() as f64;
+            let spread = (list.iter().map(|x| (x / mean - 1.0).powi(2)).sum::<f64>() / list.len() as f64).sqrt();
+            let parts = by_cells(64, 33, 0.7, |d| sky.radiance(d).x * d.dot(normal).max(0.0));
+            let want: f64 = parts.iter().sum();
+            // Within a cell the density follows the solid angle, the radiance θ: that is what is left.
+            assert!((mean / want - 1.0).abs() < 4.0 * spread / 141.0, "tilt {tilt}: {mean} vs {want}");
+            assert!(spread < 0.15, "tilt {tilt}: {spread}");
+        }
+    }
+
+    /// A surface that looks away from all light gets none.
+    #[test]
+    fn what_looks_away_gets_nothing() {
+        let sky = environment(picture(32, 17, |_, j| [f32::from(u8::from(j < 4)); 3]), 0.0);
+        for u in [0.01, 0.4, 0.9] {
+            assert!(sky.sample(-DVec3::Y, DVec2::splat(u)).is_none_or(|(d, _, _)| d.y > 0.0));
+            assert!(sky.sample(DVec3::Y, DVec2::splat(u)).is_some_and(|(d, _, pdf)| d.y > 0.0 && pdf > 0.0));
+        }
+    }
+
     /// ∫ f over every cell apart, as (column, row) → value; f is smooth within a cell.
     fn by_cells(width: usize, height: usize, turn: f64, f: impl Fn(DVec3) -> f64) -> Vec<f64> {
         let cell = |k: usize| {
@@ -133,15 +209,17 @@ mod tests {
         let mut rng = stream(5, Purpose::Study, 0);
         for (width, height, turn) in [(1, 2, 0.0), (5, 3, 1.0), (16, 9, 0.3), (40, 21, -4.0)] {
             let sky = environment(noise(width.max(2), height, &mut rng), turn);
-            let sum: f64 = by_cells(width.max(2), height, turn, |d| sky.find(d).1).iter().sum();
-            assert!((sum - 1.0).abs() < 1e-9, "{width} x {height}: {sum}");
+            for _ in 0..4 {
+                let normal = any_direction(&mut rng);
+                let sum: f64 = by_cells(width.max(2), height, turn, |d| sky.find(normal, d).1).iter().sum();
+                assert!((sum - 1.0).abs() < 1e-9, "{width} x {height}, {normal}: {sum}");
+            }
             for _ in 0..4000 {
-                let d = crate::geometry::sampling::uniform_sphere(DVec2::new(rng.random(), rng.random()));
-                let (radiance, pdf) = sky.find(d);
-                assert!(radiance == DVec3::ZERO || pdf > 0.0, "{d}: {radiance} but density {pdf}");
-                // Brightness over density is the whole's integral, but for at most a factor of 4 (2 away from the poles).
-                let ratio = brightness(radiance) / pdf / sky.density.total();
-                assert!(ratio <= 4.0 || ratio.is_nan(), "{d}: {ratio}");
+                let (normal, d) = (any_direction(&mut rng), any_direction(&mut rng));
+                let (radiance, pdf) = sky.find(normal, d);
+                assert_eq!(radiance, sky.radiance(d));
+                let lit = normal.dot(d) > 0.0 && radiance != DVec3::ZERO;
+                assert!(!lit || pdf > 0.0, "{d} above {normal}: {radiance} but density {pdf}");
             }
         }
     }
@@ -152,16 +230,19 @@ mod tests {
         for (width, height, turn) in [(2, 2, 0.0), (6, 3, 1.0), (16, 9, 0.3)] {
             let sky = environment(noise(width, height, &mut rng), turn);
             let draws = 100_000;
+            let normal = any_direction(&mut rng);
             let mut counts = vec![0.0; width * (height - 1) * 4];
             // Each cell in four: halves of φ and of θ.
             for _ in 0..draws {
-                let d = sky.sample(DVec2::new(rng.random(), rng.random()));
+                let u = DVec2::new(rng.random(), rng.random());
+                let (d, radiance, density) = sky.sample(normal, u).expect("lit");
+                assert_eq!((radiance, density), sky.find(normal, d));
                 let p = sky.grid.place(d);
                 let quarter = 2 * usize::from(p.y > 0.5) + usize::from(p.x > 0.5);
                 counts[4 * (p.row * width + p.column) + quarter] += 1.0;
             }
             let expected: Vec<f64> = {
-                let pdf = |d| sky.find(d).1;
+                let pdf = |d| sky.find(normal, d).1;
                 let fine = |k: usize| {
                     let (i, j, q) = ((k / 4 % width) as f64, (k / 4 / width) as f64, k % 4);
                     let (x, y) = (0.5 * (q % 2) as f64, 0.5 * (q / 2) as f64);

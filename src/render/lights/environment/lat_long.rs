@@ -75,6 +75,39 @@ impl LatLong {
         DVec3::new(sin * flat, up, -cos * flat).normalize()
     }
 
+    /// φ of the left edge of a column of cells, rad.
+    fn azimuth(&self, column: f64) -> f64 {
+        (column + 0.5) / self.width as f64 * TAU - self.turn
+    }
+
+    /// The direction in the middle of a block of cells: columns and rows, their ends not included.
+    pub fn middle(&self, columns: (usize, usize), rows: (usize, usize)) -> DVec3 {
+        let theta = 0.5 * PI * (rows.0 + rows.1) as f64 / (self.height - 1) as f64;
+        let (sin, cos) = self.azimuth(0.5 * (columns.0 + columns.1) as f64).sin_cos();
+        DVec3::new(sin * theta.sin(), theta.cos(), -cos * theta.sin())
+    }
+
+    /// The largest distance of a block's directions from a point: |ω − p|² = 1 + p² − 2 p·ω, and p·ω is least at an edge, at the azimuth
+    /// away from p, or, along a meridian, away from p.
+    pub fn farthest(&self, p: DVec3, columns: (usize, usize), rows: (usize, usize)) -> f64 {
+        let theta = |row: usize| PI * row as f64 / (self.height - 1) as f64;
+        let (from, to) = (self.azimuth(columns.0 as f64), self.azimuth(columns.1 as f64));
+        let away = p.x.atan2(-p.z) + PI;
+        let inside = (away - from).rem_euclid(TAU) <= to - from;
+        let least = |phi: f64| {
+            let across = p.x * phi.sin() - p.z * phi.cos();
+            let along = |theta: f64| p.y * theta.cos() + across * theta.sin();
+            let bottom = across.atan2(p.y) + PI; // where p·ω is least on the whole circle
+            let at = bottom.rem_euclid(TAU).clamp(theta(rows.0), theta(rows.1));
+            along(at).min(along(theta(rows.0))).min(along(theta(rows.1)))
+        };
+        let mut dot = least(from).min(least(to));
+        if inside {
+            dot = dot.min(least(away));
+        }
+        (1.0 + p.length_squared() - 2.0 * dot).clamp(0.0, 4.0).sqrt()
+    }
+
     /// Row counted from the nearer pole, the angle from it, and whether that is the lower one.
     fn nearer_pole(&self, row: usize, flat: f64, up: f64) -> (usize, f64, bool) {
         if 2 * row + 1 < self.height {

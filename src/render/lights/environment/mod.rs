@@ -1,5 +1,6 @@
 //! Light from all directions: constant, or from a picture of the whole sphere.
 
+mod above;
 mod density;
 mod image;
 mod lat_long;
@@ -38,7 +39,7 @@ impl Environment {
     pub fn find(&self, normal: DVec3, wi: DVec3) -> (DVec3, f64) {
         match self {
             Self::Constant(radiance) => (*radiance, FRAC_1_PI * normal.dot(wi).clamp(0.0, f64::INFINITY)),
-            Self::Image(image) => image.find(wi),
+            Self::Image(image) => image.find(normal, wi),
         }
     }
 
@@ -46,24 +47,22 @@ impl Environment {
     pub fn radiance(&self, wi: DVec3) -> DVec3 {
         match self {
             Self::Constant(radiance) => *radiance,
-            Self::Image(image) => image.find(wi).0,
+            Self::Image(image) => image.radiance(wi),
         }
     }
 
     /// A direction drawn with two numbers in [0, 1): in proportion to the cosine where the radiance is the same everywhere, else
-    /// in proportion to the radiance.
-    pub fn sample(&self, frame: &Frame, u: DVec2) -> SkySample {
+    /// about in proportion to the radiance times the cosine. `None` where no light comes from above.
+    pub fn sample(&self, frame: &Frame, u: DVec2) -> Option<SkySample> {
         match self {
             Self::Constant(radiance) => {
                 let local = sampling::cosine_hemisphere(u);
                 let pdf = sampling::cosine_hemisphere_pdf(local);
-                SkySample { wi: frame.to_world(local).normalize(), radiance: *radiance, pdf }
+                Some(SkySample { wi: frame.to_world(local).normalize(), radiance: *radiance, pdf })
             }
             Self::Image(image) => {
-                let wi = image.sample(u);
-                // Radiance and density of the direction as it was rounded, so that their ratio is bounded.
-                let (radiance, pdf) = image.find(wi);
-                SkySample { wi, radiance, pdf }
+                let (wi, radiance, pdf) = image.sample(frame.normal, u)?;
+                Some(SkySample { wi, radiance, pdf })
             }
         }
     }
