@@ -10,6 +10,7 @@ use super::fit::{parse_time, parse_tolerance};
 use super::output::{check_folder, distinct_outputs, keeps_inputs, read_text, stdout_is_free, write_bytes};
 use super::ui::{self, Ui, significant};
 use crate::chain::{self, Stage};
+use crate::control::counted;
 use crate::image::{Image, LayerKind, develop, encode_exr, encode_png, exposure_for};
 use crate::render::{LayerSet, Options, SceneSpec};
 
@@ -191,6 +192,11 @@ fn target_met(args: &Args, image: &Image) -> bool {
 
 /// What whoever looks at the picture should know.
 fn warn(args: &Args, image: &Image, ui: &Ui) {
+    let not_finite = image.radiance.iter().flatten().filter(|r| !r.is_finite()).count();
+    if not_finite > 0 {
+        let values = counted(not_finite as u64, "value");
+        ui.warn(&format!("{values} of the picture: not finite, by a mistake of the program; please report the scene"));
+    }
     if ui::stop().requested() {
         ui.warn("stopped: the picture has fewer samples than asked for");
     }

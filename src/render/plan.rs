@@ -18,7 +18,7 @@ pub struct Plan {
     pub chance: bool,
     /// Light that nothing can hide is integrated in closed form, where there is one.
     pub closed_forms: bool,
-    /// Paths are followed eight at a time.
+    /// Paths are followed side by side, on the vector units.
     pub packets: bool,
 }
 
@@ -115,7 +115,7 @@ impl Plan {
 
     fn why_packets(self) -> &'static str {
         if self.packets {
-            "spheres, planes and quads with sums of lobes: eight paths at a time"
+            "spheres, planes and quads with sums of lobes: sixteen paths side by side"
         } else {
             "meshes, tables, pictures of light, spots or shining spheres: one path at a time"
         }

@@ -69,6 +69,9 @@ impl Schedule {
             return (pass > 0).then(|| vec![pass; self.have.len()]);
         }
         let all = Noise::all(noise);
+        if all.sum.is_nan() {
+            return None; // no samples mend a value that is no number
+        }
         if self.target.is_some_and(|target| all.error().at_most <= target) {
             return None;
         }

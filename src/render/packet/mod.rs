@@ -1,4 +1,4 @@
-//! Eight paths at a time, on the vector units.
+//! Sixteen paths side by side, on the vector units.
 //!
 //! What [`super::integrator`] does one path at a time, for scenes of spheres, planes and quads whose materials are sums of lobes; both are the same
 //! estimator (lights aimed at and met, power heuristic, roulette), so pictures agree within their noise; where light has a closed form, it takes no samples ([`closed`]). Paths are

@@ -1,7 +1,7 @@
 //! Which part of a picture of the sky lights a surface: its blocks in a tree, drawn in proportion to their light times the cosine.
 //!
-//! A node knows the light's mean direction m (the mean of ω weighted by brightness) and a radius r within which all of its directions lie about m. For a
-//! unit normal n, what the node gives is its light times n·m, exactly, where all of it is above the horizon (n·m ≥ r); nothing where
+//! A node knows the light's mean direction m (the mean of its blocks' middles weighted by their light) and a radius r within which all of its directions lie
+//! about m. For a unit normal n, what the node gives is its light times n·m where all of it is above the horizon (n·m ≥ r); nothing where
 //! n·m ≤ −r; between them (n·m + r)²/4r, which joins both smoothly. A leaf is drawn by going down, at each fork in proportion to what the
 //! branches give, with the number that was drawn stretched again: even points stay even.
 
@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::lat_long::LatLong;
 
-/// Leaves at most, unless a row or a column alone has more.
+/// Leaves at most.
 const MOST_LEAVES: usize = 1 << 16;
 /// Added to a radius: more than f32 loses in n·m.
 const ROUNDING: f32 = 2e-6;
@@ -87,15 +87,20 @@ impl Above {
     /// The tree over a grid; `share` is the share of the whole light that a block of cells has: those in the columns (from, to) and
     /// rows (from, to).
     pub fn new(grid: &LatLong, share: impl Fn((usize, usize), (usize, usize)) -> f64) -> Self {
-        let (width, height) = (grid.width, grid.height - 1);
-        let mut block = 1;
-        while width.div_ceil(block) * height.div_ceil(block) > MOST_LEAVES {
-            block *= 2;
-        }
+        let (width, height, block) = (grid.width, grid.height - 1, Self::block(grid));
         let whole = Range { columns: (0, width.div_ceil(block)), rows: (0, height.div_ceil(block)) };
         let mut tree = Self { nodes: vec![Node::default()], whole, block };
         tree.grow(0, whole, grid, &share);
         tree
+    }
+
+    /// Cells along the side of a block of a grid.
+    pub fn block(grid: &LatLong) -> usize {
+        let mut block = 1;
+        while grid.width.div_ceil(block) * (grid.height - 1).div_ceil(block) > MOST_LEAVES {
+            block *= 2;
+        }
+        block
     }
 
     fn grow(

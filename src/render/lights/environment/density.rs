@@ -15,7 +15,8 @@ use super::lat_long::{LatLong, Place};
 pub struct Density {
     /// ∫ brightness dω, W/m².
     total: f64,
-    /// Running sums of the mean corner along each row of cells, W/(sr·m²).
+    /// Running sums of the mean corner along each row of a block's cells, W/(sr·m²), which begin anew with each block: what is dark keeps its digits beside
+    /// what is bright.
     cells: Vec<f64>,
 }
 
@@ -23,17 +24,20 @@ pub struct Density {
 pub type Corners = [f64; 4];
 
 impl Density {
-    /// The density of a grid whose cells have these corners.
-    pub fn new(grid: &LatLong, corners: impl Fn(usize, usize) -> Corners) -> Self {
+    /// The density of a grid whose cells have these corners, for blocks of so many columns.
+    pub fn new(grid: &LatLong, block: usize, corners: impl Fn(usize, usize) -> Corners) -> Self {
         let mut total = 0.0;
         let mut cells = Vec::with_capacity(grid.width * (grid.height - 1));
         for row in 0..grid.height - 1 {
-            let mut sum = 0.0;
+            let (mut sum, mut of_row) = (0.0, 0.0);
             for column in 0..grid.width {
+                if column % block == 0 {
+                    of_row += std::mem::take(&mut sum);
+                }
                 sum += mean(corners(column, row));
                 cells.push(sum);
             }
-            total += sum * grid.solid_angle(row);
+            total += (of_row + sum) * grid.solid_angle(row);
         }
         Self { total, cells }
     }
@@ -52,21 +56,18 @@ impl Density {
         (lerp(lerp(a, b, place.x), lerp(c, d, place.x), place.s)) / self.total()
     }
 
-    /// Light of a block of cells, columns and rows without their ends, W/m².
+    /// Light of cells of one block, columns and rows without their ends, W/m².
     pub fn light(&self, grid: &LatLong, columns: (usize, usize), rows: (usize, usize)) -> f64 {
         (rows.0..rows.1).map(|row| self.of_row(grid, columns, row)).sum()
     }
 
-    /// Sums along a row up to and before some of its cells.
-    fn sums(&self, grid: &LatLong, columns: (usize, usize), row: usize) -> (&[f64], f64) {
-        let row = self.cells.get(row * grid.width..(row + 1) * grid.width).unwrap_or_default();
-        let before = if columns.0 == 0 { 0.0 } else { row.get(columns.0 - 1).copied().unwrap_or(0.0) };
-        (row.get(columns.0..columns.1).unwrap_or_default(), before)
+    /// Sums along a row of a block.
+    fn sums(&self, grid: &LatLong, columns: (usize, usize), row: usize) -> &[f64] {
+        self.cells.get(row * grid.width + columns.0..row * grid.width + columns.1).unwrap_or_default()
     }
 
     fn of_row(&self, grid: &LatLong, columns: (usize, usize), row: usize) -> f64 {
-        let (sums, before) = self.sums(grid, columns, row);
-        (sums.last().copied().unwrap_or(before) - before) * grid.solid_angle(row)
+        self.sums(grid, columns, row).last().copied().unwrap_or(0.0) * grid.solid_angle(row)
     }
 
     /// The row of a block in which the share u of its light lies, and how far through it, 0 to 1.
@@ -95,8 +96,7 @@ impl Density {
         u: DVec2,
     ) -> (usize, usize, f64, f64) {
         let (row, s) = self.pick_row(grid, columns, rows, u.x);
-        let (sums, before) = self.sums(grid, columns, row);
-        let (column, x) = pick(sums, before, u.y);
+        let (column, x) = pick(self.sums(grid, columns, row), 0.0, u.y);
         let column = column + columns.0;
         if at_pole(grid, row) {
             return (column, row, x, s);

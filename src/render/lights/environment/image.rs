@@ -39,7 +39,9 @@ impl EnvironmentImage {
     pub fn new(path: &Path, picture: ColorGrid, scale: f64, turn: f64) -> Result<Option<Self>, RenderError> {
         check(path, &picture)?;
         let grid = LatLong::new(picture.width, picture.height, turn);
-        let density = Density::new(&grid, |column, row| corners(&grid, &picture.pixels, column, row).map(brightness));
+        let block = Above::block(&grid);
+        let density =
+            Density::new(&grid, block, |column, row| corners(&grid, &picture.pixels, column, row).map(brightness));
         if !(density.total() > 0.0 && scale > 0.0) {
             return Ok(None);
         }
@@ -65,7 +67,7 @@ impl EnvironmentImage {
         // In proportion to the radiance within the block.
         let by_radiance = self.density.pdf(&self.grid, place, at.map(brightness));
         let share = self.density.light(&self.grid, drawn.columns, drawn.rows) / self.density.total();
-        let pdf = if by_radiance > 0.0 { by_radiance / share * drawn.probability } else { 0.0 };
+        let pdf = if by_radiance > 0.0 && share > 0.0 { by_radiance / share * drawn.probability } else { 0.0 };
         (self.scale * bilinear(at, place), pdf)
     }
 
@@ -221,6 +223,31 @@ mod tests {
                 let lit = normal.dot(d) > 0.0 && radiance != DVec3::ZERO;
                 assert!(!lit || pdf > 0.0, "{d} above {normal}: {radiance} but density {pdf}");
             }
+        }
+    }
+
+    /// A sky that falls by forty decades within a row: what is dark is dark, and no density is anything but a number. Blocks of several cells too.
+    #[test]
+    fn a_sky_of_forty_decades_has_finite_densities() {
+        let mut rng = stream(7, Purpose::Study, 0);
+        for (width, height) in [(64, 33), (700, 301)] {
+            let of = |k: usize, all: usize| (k as f64 / all as f64 - 0.4).powi(2);
+            let value = |i: usize, j: usize| (1e4 * (-250.0 * (of(i, width) + of(j, height))).exp()) as f32;
+            let sky = environment(picture(width, height, |i, j| [value(i, j); 3]), 0.3);
+            for _ in 0..4000 {
+                let (normal, d) = (any_direction(&mut rng), any_direction(&mut rng));
+                let (radiance, pdf) = sky.find(normal, d);
+                assert!(pdf.is_finite() && pdf >= 0.0, "{d} above {normal}: {radiance}, {pdf}");
+                let u = DVec2::new(rng.random(), rng.random());
+                if let Some((d, radiance, pdf)) = sky.sample(normal, u) {
+                    let ratio = radiance.x / pdf;
+                    assert!(pdf > 0.0 && ratio.is_finite(), "{d} above {normal}: {radiance}, {pdf}");
+                }
+            }
+            let normal = DVec3::Y;
+            let sum: f64 =
+                if width < 100 { by_cells(width, height, 0.3, |d| sky.find(normal, d).1).iter().sum() } else { 1.0 };
+            assert!((sum - 1.0).abs() < 1e-9, "{sum}");
         }
     }
 
