@@ -2,6 +2,7 @@
 
 use rand_distr::{Distribution, Normal, Poisson};
 
+use super::effects::quantisation::step;
 use super::parts::{Axes, Detector, Holder, Protocol, Reference, Source, Surroundings, shown};
 use super::reduce::{positions, saturation_limit};
 use crate::numeric::random::{Purpose, stream};
@@ -129,12 +130,16 @@ impl Instrument {
 
     /// A full well that noise and rounding fill would leave no reading that is safe from saturation.
     fn well_fault(&self) -> Option<String> {
-        let Detector { full_well, offset, .. } = self.detector;
+        let Detector { full_well, offset, nonlinearity_u, .. } = self.detector;
         (full_well > 0.0 && saturation_limit(self) <= offset).then(|| {
+            let left = 1.0 - 4.0 * nonlinearity_u - step(&self.detector) / full_well;
+            if left <= 0.0 {
+                return "instrument.detector.bits: a step of the converter and 4 nonlinearity_u leave no signal that is safe from saturation".into();
+            }
             format!(
-                "instrument.detector.full_well: expected more than what offset, five times read_noise, a step of the converter and 4 nonlinearity_u of it take, \
-                 {} here, or no reading is safe from saturation; found {}",
-                shown(full_well - saturation_limit(self) + offset),
+                "instrument.detector.full_well: expected more than {} (offset and five times read_noise, over 1 − 4 nonlinearity_u less a step of the \
+                 converter), or no reading is safe from saturation; found {}",
+                shown((offset + 5.0 * self.read_noise) / left),
                 shown(full_well)
             )
         })
@@ -283,10 +288,10 @@ mod tests {
                 |i| i.detector.full_well = 1e-13,
                 "instrument.detector.full_well: expected 0 (never saturates) or a number from 1e-12 to 1e18",
             ),
-            // Five times a read noise of 10, and 0.4 of 80.
+            // Five times a read noise of 10 over 1 − 4·0.1.
             (
                 |i| (i.detector.full_well, i.detector.nonlinearity_u) = (80.0, 0.1),
-                "take, 82 here, or no reading is safe from saturation; found 80",
+                "instrument.detector.full_well: expected more than 83.33333333333333 (offset",
             ),
             (
                 |i| i.detector.nonlinearity_u = 0.3,

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::experiment::sigma;
 use crate::support::*;
 use goniofit::control::Control;
-use goniofit::gonio::parts::Detector;
+use goniofit::gonio::parts::{Detector, Reference};
 use goniofit::gonio::{Instrument, Raw};
 use goniofit::measurement::Directions;
 
@@ -130,7 +130,8 @@ fn a_walk_that_no_reference_tells_is_shared_as_far_as_it_is() {
 /// Electronics that add 50 to every reading: dark and blank of the same exposure have them too, those of another do not tell.
 #[test]
 fn what_is_subtracted_is_of_the_same_exposure() {
-    let base = |kind: &str, time: u32| format!(",,,,{kind},{time},0.1,0,51\n,,,,{kind},{},1,0,60\n", time + 1);
+    // Clocks differ in their last digits.
+    let base = |kind: &str, time: u32| format!(",,,,{kind},{time},0.10000001,0,51\n,,,,{kind},{},1,0,60\n", time + 1);
     let sample = |angle: u32, time: u32, exposure: f64, rate: f64| {
         format!("0,0,{angle},0,sample,{time},{exposure},0,{}\n", 50.0 + exposure * (rate + 10.0))
     };
@@ -139,7 +140,46 @@ fn what_is_subtracted_is_of_the_same_exposure() {
     let m = goniofit::gonio::reduce("m", &raw, &Instrument::noiseless(), None).expect("reduced").measurement;
     let cos = |deg: f64| deg.to_radians().cos();
     let (a, b) = (m.value(0, 0).expect("valid") * cos(30.0), m.value(0, 1).expect("valid") * cos(60.0));
-    assert!((a - 1000.0).abs() < 1e-9 && (b - 30.0).abs() < 1e-9, "{a} {b}");
+    assert!((a - 1000.0).abs() < 1e-4 && (b - 30.0).abs() < 1e-9 && m.notes.is_empty(), "{a} {b} {:?}", m.notes);
+    // Of half a second there is no dark: said, and a described offset comes off all the same.
+    let rows = [base("dark", 0), sample(30, 4, 0.5, 1000.0), base("dark", 8)].concat();
+    let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}{rows}")).expect("valid");
+    let of =
+        |instrument: &Instrument| goniofit::gonio::reduce("m", &raw, instrument, None).expect("reduced").measurement;
+    let blind = of(&Instrument::noiseless());
+    assert!(
+        blind.notes.iter().any(|n| n.starts_with("no blank or dark has the exposure of 0.5 s")),
+        "{:?}",
+        blind.notes
+    );
+    let detector = Detector { offset: 50.0, ..Detector::default() };
+    let told = of(&Instrument { electrons: 1.0, read_noise: 0.0, detector, ..Instrument::default() });
+    assert!((told.value(0, 0).expect("valid") * cos(30.0) - 1000.0).abs() < 1e-9);
+}
+
+/// The noise of the one visit to the white is in all readings, however often blanks were read.
+#[test]
+fn a_visit_s_noise_is_shared_however_often_others_are_read() {
+    let of = |blanks: usize| {
+        let mut rows = ",,,,reference,0,1,0,3000\n,,,,reference,1,1,1,3000\n,,,,blank,2,1,0,10\n".to_owned();
+        for k in 0..60 {
+            rows += &format!("0,0,{k},0,sample,{},1,0,2000\n", 10 + 2 * k);
+            if k % (60 / blanks) == 0 {
+                rows += &format!(",,,,blank,{},1,0,10\n", 11 + 2 * k);
+            }
+        }
+        let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}{rows}")).expect("valid");
+        let reference = Reference { reflectance: 0.98, ..Reference::default() };
+        let instrument = Instrument { electrons: 1e4, reference, ..Instrument::default() };
+        let reduction = goniofit::gonio::reduce("m", &raw, &instrument, None).expect("reduced");
+        let line = reduction.budget.lines.iter().position(|l| l.name == "noise of the reference").expect("there");
+        let shared: f64 = reduction.measurement.common.iter().map(|k| k[30] * k[30]).sum();
+        (reduction.budget.contribution(line, 30), shared.sqrt())
+    };
+    for blanks in [1, 12, 60] {
+        let (reference, shared) = of(blanks);
+        assert!(shared > 0.99 * reference, "{blanks}: {shared} of {reference}");
+    }
 }
 
 /// An instrument whose electronics have an offset reads what one without it does, in every exposure, and is as sure.

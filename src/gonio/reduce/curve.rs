@@ -16,6 +16,8 @@ const ROUNDS: usize = 4000;
 /// Probability of repeats that belong to no curve, and rounds of leaving such out.
 const STRAYED: f64 = 1e-9;
 const SIEVES: usize = 5;
+/// How many times its mean the square of a walk may be.
+const WALKS: f64 = 25.0;
 /// By which factor a signal may lie beside all that was repeated and still be like them.
 const ALIKE: f64 = 1.5;
 /// Eigenvalue of the scaled information below which a direction is open.
@@ -26,6 +28,8 @@ const OPEN: f64 = 1e-9;
 struct Point {
     signal: f64,
     variance: f64,
+    /// What described drift has of it.
+    walked: f64,
     freedom: f64,
 }
 
@@ -39,8 +43,12 @@ fn binned(mut points: Vec<Point>) -> Vec<Point> {
             Some(bin) if bin.freedom + point.freedom <= most => {
                 let freedom = bin.freedom + point.freedom;
                 let mean = |a: f64, b: f64| (bin.freedom * a + point.freedom * b) / freedom;
-                let (signal, variance) = (mean(bin.signal, point.signal), mean(bin.variance, point.variance));
-                *bin = Point { signal, variance, freedom };
+                *bin = Point {
+                    signal: mean(bin.signal, point.signal),
+                    variance: mean(bin.variance, point.variance),
+                    walked: mean(bin.walked, point.walked),
+                    freedom,
+                };
             }
             _ => bins.push(point),
         }
@@ -68,8 +76,8 @@ impl Curve {
             .iter()
             .filter(|(_, r)| r.count > 1)
             .map(|(signal, r)| {
-                let variance = (r.scatter - r.walked(instrument)).max(0.0);
-                (Point { signal: *signal, variance, freedom: r.count as f64 - 1.0 }, *r)
+                let (variance, walked) = (r.scatter, r.walked(instrument));
+                (Point { signal: *signal, variance, walked, freedom: r.count as f64 - 1.0 }, *r)
             })
             .collect();
         let freedom = |kept: &[(Point, &Repeats)]| kept.iter().map(|k| k.0.freedom).fold(0.0, |a, b| a + b);
@@ -79,7 +87,9 @@ impl Curve {
             }
             let curve = Self::of(&binned(kept.iter().map(|k| k.0).collect()))?;
             let before = kept.len();
-            kept.retain(|(point, r)| curve.at(point.signal).is_some_and(|(noise, _)| !has_strayed(noise, step, r)));
+            kept.retain(|(point, r)| {
+                curve.at(point.signal).is_some_and(|(noise, _)| !has_strayed(noise, step, r, instrument))
+            });
             if kept.len() == before {
                 return Ok(curve);
             }
@@ -121,7 +131,7 @@ impl Curve {
     fn step(&mut self, points: &[Point]) {
         let (mut up, mut down) = (Vector3::zeros(), Vector3::zeros());
         for point in points {
-            let (x, model) = (self.terms(point.signal), self.model(point.signal));
+            let (x, model) = (self.terms(point.signal), self.model(point.signal) + point.walked);
             if model > 0.0 {
                 up += x * (point.freedom * (point.variance / model) / model);
                 down += x * (point.freedom / model);
@@ -138,7 +148,7 @@ impl Curve {
     fn know(&mut self, points: &[Point]) {
         let mut all = Matrix3::zeros();
         for point in points {
-            let (x, model) = (self.terms(point.signal), self.model(point.signal));
+            let (x, model) = (self.terms(point.signal), self.model(point.signal) + point.walked);
             if model > 0.0 {
                 let x = x / model;
                 all += x * x.transpose() * (0.5 * point.freedom);
@@ -205,9 +215,11 @@ impl Curve {
     }
 }
 
-/// Whether these repeats scatter as none by this noise would, and by steps, between two of which they may fall either way.
-pub(super) fn has_strayed(noise: f64, step: f64, of: &Repeats) -> bool {
+/// Whether these repeats scatter as none by this noise would, by steps, between two of which they may fall either way, and by what walks meanwhile, whose
+/// squares scatter widely.
+pub(super) fn has_strayed(noise: f64, step: f64, of: &Repeats, instrument: &Instrument) -> bool {
     let (freedom, most) =
         (of.count as f64 - 1.0, noise + 0.25 * step * step * of.count as f64 / (of.count as f64 - 1.0));
-    freedom > 0.0 && of.scatter > most && chi_square_p(freedom * of.scatter / most, freedom) < STRAYED
+    let scatter = of.scatter - WALKS * of.walked(instrument);
+    freedom > 0.0 && scatter > most && chi_square_p(freedom * scatter / most, freedom) < STRAYED
 }

@@ -104,7 +104,7 @@ pub fn reduce(
 ) -> Result<Reduction, ReduceError> {
     let summaries = stops::summaries(raw, instrument);
     let noise = Noise::of(raw, &summaries, instrument);
-    let stops: Vec<Stop> = summaries.iter().map(|summary| summary.stop(&noise)).collect();
+    let stops: Vec<Stop> = summaries.iter().map(|summary| summary.stop(&noise, instrument)).collect();
     let has_reference = stops.iter().any(|s| s.kind == Kind::Reference);
     if !stops.iter().any(|s| s.kind == Kind::Sample) {
         return Err(ReduceError::NoSample);
@@ -114,7 +114,8 @@ pub fn reduce(
         return Err(if has_reference { ReduceError::NoCertificate } else { unread() });
     }
     let visits = Visits::new(&stops, raw, instrument)?;
-    let notes = noise.notes(raw, &summaries, instrument);
+    let mut notes = noise.notes(raw, &summaries, instrument);
+    notes.extend(visits.unmatched(&stops));
     let work = Work { raw, instrument, noise, scale: Scale::new(instrument, raw.dimension), visits };
     let mut reduction = work.run(name, &stops, model);
     reduction.measurement.notes.extend(notes);

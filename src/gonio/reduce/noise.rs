@@ -41,7 +41,7 @@ impl Noise {
     }
 
     /// Variance of the mean of repeats, in signals².
-    pub fn variance(&self, channel: usize, of: &Repeats) -> f64 {
+    pub fn variance(&self, channel: usize, of: &Repeats, instrument: &Instrument) -> f64 {
         let count = of.count as f64;
         match self {
             Self::Described(known) => {
@@ -50,7 +50,7 @@ impl Noise {
                 common + (noise + own) / count
             }
             Self::Scattered(scatter) => {
-                let (shown, step) = (scatter.variance(channel, of), scatter.step(channel));
+                let (shown, step) = (scatter.variance(channel, of, instrument), scatter.step(channel));
                 // What does not come and go with repeats does not show in them.
                 rounding(before_rounding(shown, step), step).0 + shown / count
             }
@@ -77,7 +77,7 @@ impl Noise {
     pub fn notes(&self, raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Vec<String> {
         match self {
             Self::Described(known) => known.contradictions(raw, summaries, instrument),
-            Self::Scattered(scatter) => scatter.notes(raw, summaries),
+            Self::Scattered(scatter) => scatter.notes(raw, summaries, instrument),
             Self::Unknown(_) => Vec::new(),
         }
     }
@@ -141,14 +141,17 @@ impl Described {
         let mut tally = Tally::default();
         for (at_s, repeats) in of.filter_map(|s| Some((s.time_s, s.repeats[c].as_ref()?))) {
             let (own, shot) = (repeats.count as f64 - 1.0, (repeats.signal - self.offset).max(0.0));
-            let expected = shot + self.read + self.step * self.step / 12.0 + repeats.walked(instrument);
+            let walked = repeats.walked(instrument);
+            let expected = shot + self.read + self.step * self.step / 12.0 + walked;
             if own == 0.0 || expected == 0.0 {
                 continue;
             }
             let ratio = repeats.scatter / expected;
             tally.sum += own * ratio;
-            // Of s², by the fourth cumulant of electrons that come by chance.
-            tally.variance += own * own * (2.0 / own + shot / (expected * expected * repeats.count as f64));
+            // Of s², by the fourth cumulant of electrons that come by chance, and by what walks, as a whole.
+            let share = walked / expected;
+            let of_ratio = 2.0 / own + shot / (expected * expected * repeats.count as f64) + share * share;
+            tally.variance += own * own * of_ratio;
             tally.freedom += own;
             if ratio > tally.worst.0 {
                 tally.worst = (ratio, at_s);

@@ -8,12 +8,14 @@
 
 use super::curve::{Curve, has_strayed};
 use super::noise::readings;
-use super::stops::{Repeats, Summary};
+use super::stops::{Repeats, Summary, are_same};
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::reading::Kind;
 
+/// Stops that read the same largest signal.
+const CLIPPED: usize = 3;
 /// How many times the largest repeated signal more than half of the sample's may be.
 const FAR: f64 = 10.0;
 
@@ -63,10 +65,10 @@ impl Scatter {
     }
 
     /// Variance of one of these repeats, which the curve was made for.
-    pub fn variance(&self, channel: usize, of: &Repeats) -> f64 {
+    pub fn variance(&self, channel: usize, of: &Repeats, instrument: &Instrument) -> f64 {
         let Channel { curve, base, step } = &self.0[channel];
         let noise = curve.at(net(base, of)).map_or(f64::NAN, |found| found.0);
-        if has_strayed(noise, *step, of) { of.scatter.max(noise) } else { noise }
+        if has_strayed(noise, *step, of, instrument) { of.scatter.max(noise) } else { noise }
     }
 
     /// Smallest step between signals.
@@ -80,7 +82,7 @@ impl Scatter {
     }
 
     /// Where σ is an upper limit, and where repeats scatter as none of the others do.
-    pub fn notes(&self, raw: &Raw, summaries: &[Summary]) -> Vec<String> {
+    pub fn notes(&self, raw: &Raw, summaries: &[Summary], instrument: &Instrument) -> Vec<String> {
         let (mut limits, mut strayed, mut worst) = (0, 0, (0.0, String::new()));
         for summary in summaries {
             for (c, Channel { curve, base, step }) in self.0.iter().enumerate() {
@@ -90,7 +92,7 @@ impl Scatter {
                     continue;
                 };
                 limits += usize::from(summary.kind == Kind::Sample && found.1);
-                if has_strayed(found.0, *step, repeats) {
+                if has_strayed(found.0, *step, repeats, instrument) {
                     strayed += 1;
                     let ratio = repeats.scatter / found.0;
                     if ratio > worst.0 {
@@ -112,8 +114,24 @@ impl Scatter {
                 worst.0.sqrt()
             )
         });
-        limit.into_iter().chain(stray).collect()
+        limit.into_iter().chain(stray).chain(clipped(raw, summaries)).collect()
     }
+}
+
+/// Says so where several stops read the largest signal of the log to its last digit: a detector that takes no more, most likely.
+fn clipped(raw: &Raw, summaries: &[Summary]) -> Option<String> {
+    let of = |c: usize| {
+        let samples = || summaries.iter().filter(|s| s.kind == Kind::Sample).filter_map(move |s| s.repeats[c].as_ref());
+        let most = samples().map(|r| r.signal).fold(f64::NEG_INFINITY, f64::max);
+        let count = samples().filter(|r| r.signal == most && r.scatter == 0.0).count();
+        (count >= CLIPPED).then(|| {
+            format!(
+                "{count} stops read {most}, the largest signal of channel {}: if the detector takes no more, say so (instrument.detector.full_well), or write inf",
+                raw.channels[c]
+            )
+        })
+    };
+    (0..raw.channels.len()).find_map(of)
 }
 
 /// Mean signal of the blank, else of the dark, by exposure.
@@ -122,7 +140,7 @@ fn base(summaries: &[Summary], c: usize) -> Vec<(f64, f64)> {
         let mut sums: Vec<(f64, f64, f64)> = Vec::new();
         for r in summaries.iter().filter(|s| s.kind == kind).filter_map(|s| s.repeats[c].as_ref()) {
             let count = r.count as f64;
-            match sums.iter_mut().find(|s| s.0 == r.exposure_s) {
+            match sums.iter_mut().find(|s| are_same(s.0, r.exposure_s)) {
                 Some(sum) => (sum.1, sum.2) = (sum.1 + count * r.signal, sum.2 + count),
                 None => sums.push((r.exposure_s, count * r.signal, count)),
             }

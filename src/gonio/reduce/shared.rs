@@ -55,6 +55,7 @@ impl Family {
 pub(super) struct Shared<'a> {
     instrument: &'a Instrument,
     size: usize,
+    width: usize,
     families: Vec<Family>,
     /// Variance of readings that was attributed; empty for none.
     own: Vec<f64>,
@@ -63,13 +64,16 @@ pub(super) struct Shared<'a> {
     of_stops: Vec<f64>,
     /// Component of (family, group of visits, channel or mode).
     places: std::collections::HashMap<(usize, usize, usize), usize>,
-    /// Visits that are one component.
-    group: usize,
+    /// Visits to the base, and to the reference, that are one component.
+    groups: [usize; 2],
     has_reference: bool,
     /// When the last reading was made.
     end_s: f64,
 }
 
+/// Kinds of visits.
+const OF_BASE: usize = 0;
+const OF_REFERENCE: usize = 1;
 /// Families in the order of the budget.
 pub(super) const READING: usize = 0;
 const REFERENCE: usize = 1;
@@ -115,12 +119,13 @@ impl<'a> Shared<'a> {
         Self {
             instrument,
             size,
+            width,
             families,
             own: Vec::new(),
             components: Vec::new(),
             of_stops: Vec::new(),
             places: std::collections::HashMap::new(),
-            group: visits.len().div_ceil(afforded).max(1),
+            groups: visits.len().map(|count| count.div_ceil(afforded).max(1)),
             has_reference: visits.has[1],
             end_s,
         }
@@ -188,10 +193,11 @@ impl<'a> Shared<'a> {
     }
 
     /// Adds an error that all readings between visits share, by group.
-    fn add_grouped(&mut self, family: usize, visit: usize, part: usize, place: usize, u: f64) {
-        let count = self.group as f64;
-        self.add(family, (visit / self.group, part), place, u / count.sqrt());
-        if self.group > 1 {
+    fn add_grouped(&mut self, (family, kind): (usize, usize), visit: usize, part: usize, place: usize, u: f64) {
+        let group = self.groups[kind];
+        let count = group as f64;
+        self.add(family, (visit / group, part), place, u / count.sqrt());
+        if group > 1 {
             self.add_own(family, place, u * u * (1.0 - 1.0 / count));
         }
     }
@@ -205,27 +211,32 @@ impl<'a> Shared<'a> {
             let sensitivity = -value / at.reference * part.share;
             self.families[REFERENCE].was_read(part.sigma, sensitivity);
             let u = sensitivity * part.sigma;
-            self.add_grouped(REFERENCE, part.number, channel, place, u);
+            self.add_grouped((REFERENCE, OF_REFERENCE), part.visit, channel, place, u);
         }
         for part in &at.base_parts {
             let sensitivity = value / at.reference * part.through_reference - conversion * part.direct;
             self.families[BASE].was_read(part.sigma, sensitivity);
             let u = sensitivity * part.sigma;
-            self.add_grouped(BASE, part.number, channel, place, u);
+            self.add_grouped((BASE, OF_BASE), part.visit, channel + self.width * part.list, place, u);
         }
         self.add(CERTIFICATE, (0, 0), place, value * self.instrument.reference.reflectance_u);
         // Stray light drifts with the source, between visits to the blank.
         let instrument = self.instrument;
         let stray = conversion * instrument.gain() * instrument.surroundings.stray_per_sr;
         let (drift, has_reference) = (instrument.source.drift_per_sqrt_hour, self.has_reference);
-        self.bridge(DRIFT, place, &at.base_gap, stray * drift);
+        self.bridge((DRIFT, OF_BASE), place, &at.base_gap, stray * drift);
         if has_reference {
-            self.bridge(DRIFT, place, &at.reference_gap, value * drift);
+            self.bridge((DRIFT, OF_REFERENCE), place, &at.reference_gap, value * drift);
         } else {
             // Nothing tells how far the power has walked since the start.
             self.walk(DRIFT, place, of.time_s, value * drift);
         }
-        self.bridge(DARK, place, &at.base_gap, conversion * self.instrument.detector.dark_drift_per_sqrt_hour);
+        self.bridge(
+            (DARK, OF_BASE),
+            place,
+            &at.base_gap,
+            conversion * self.instrument.detector.dark_drift_per_sqrt_hour,
+        );
         let detector = &self.instrument.detector;
         if detector.nonlinearity_u > 0.0 {
             let of_reference = if has_reference { value / at.reference * at.reference_bent } else { 0.0 };
@@ -260,7 +271,7 @@ impl<'a> Shared<'a> {
 
     /// A walk of σ `per_sqrt_hour` that two visits know the ends of: a Brownian bridge, √2 Σ sin(mπτ)/(mπ) times normal numbers and √span. Before the
     /// first and after the last visit it walks on.
-    fn bridge(&mut self, family: usize, place: usize, gap: &Gap, per_sqrt_hour: f64) {
+    fn bridge(&mut self, (family, kind): (usize, usize), place: usize, gap: &Gap, per_sqrt_hour: f64) {
         self.add(family, (usize::MAX, gap.number), place, per_sqrt_hour * (gap.beyond_s / 3600.0).sqrt());
         let sigma = per_sqrt_hour * (gap.span_s / 3600.0).sqrt();
         let (interval, late) = (gap.number, gap.late);
@@ -269,7 +280,9 @@ impl<'a> Shared<'a> {
             let at = std::f64::consts::PI * mode as f64;
             let share = 2f64.sqrt() * (at * late).sin() / at;
             left -= share * share;
-            self.add_grouped(family, interval, mode, place, sigma * share);
+            // Intervals of base and reference are the same ones where both were visited together.
+            let apart = if self.groups[OF_BASE] == self.groups[OF_REFERENCE] { 0 } else { kind * (MODES + 1) };
+            self.add_grouped((family, kind), interval, mode + apart, place, sigma * share);
         }
         if sigma != 0.0 {
             self.add_own(family, place, sigma * sigma * left.max(0.0));

@@ -8,6 +8,8 @@ use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::reading::{Kind, Reading};
 
+/// By which share exposures may differ that are called the same.
+const SAME: f64 = 1e-3;
 /// Terms of the series of what rounding leaves in common, and halvings that find the noise behind it.
 const HARMONICS: i32 = 20;
 const HALVINGS: u32 = 30;
@@ -63,20 +65,31 @@ pub(super) struct Summary {
 
 impl Summary {
     /// With the noise of its readings.
-    pub fn stop(&self, noise: &Noise) -> Stop {
-        let of = |(c, repeats): (usize, &Option<Repeats>)| repeats.map(|r| r.rate(noise.variance(c, &r)));
+    pub fn stop(&self, noise: &Noise, instrument: &Instrument) -> Stop {
+        let of = |(c, repeats): (usize, &Option<Repeats>)| repeats.map(|r| r.rate(noise.variance(c, &r, instrument)));
         let rates = self.repeats.iter().enumerate().map(of).collect();
         Stop { kind: self.kind, entry: self.entry, number: self.number, time_s: self.time_s, rates }
     }
+}
+
+/// Exposures that are not the same, descending.
+pub(super) fn distinct(all: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut list: Vec<f64> = all.collect();
+    list.sort_by(|a, b| b.total_cmp(a));
+    list.dedup_by(|next, kept| are_same(*next, *kept));
+    list
+}
+
+/// Whether two exposures are the same but for the clock's last digits.
+pub(super) fn are_same(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() < SAME
 }
 
 /// Readings by stop, in order of time.
 pub(super) fn summaries(raw: &Raw, instrument: &Instrument) -> Vec<Summary> {
     let (mut first, mut list) = (0, Vec::new());
     for run in raw.readings.chunk_by(|a, b| a.stop == b.stop) {
-        let mut exposures: Vec<f64> = run.iter().map(|reading| reading.exposure_s).collect();
-        exposures.sort_by(|a, b| b.total_cmp(a));
-        exposures.dedup();
+        let exposures = distinct(run.iter().map(|reading| reading.exposure_s));
         // What is subtracted is wanted in the exposure of what it is subtracted from.
         let is_base = matches!(run[0].kind, Kind::Blank | Kind::Dark);
         let parts = exposures.chunks(if is_base { 1 } else { exposures.len() });
@@ -92,7 +105,7 @@ fn combined(raw: &Raw, instrument: &Instrument, (first, run): (usize, &[Reading]
     let channel = |c: usize| {
         // The longest exposure of which no reading saturates; a repeat that was not read counts for nothing.
         exposures.iter().find_map(|exposure| {
-            let of_exposure = run.iter().enumerate().filter(|(_, reading)| reading.exposure_s == *exposure);
+            let of_exposure = run.iter().enumerate().filter(|(_, reading)| are_same(reading.exposure_s, *exposure));
             let all = of_exposure.map(|(i, reading)| (reading.time_s, raw.signals(first + i)[c]));
             let signals: Vec<(f64, f64)> = all.filter(|(_, s)| !s.is_nan()).collect();
             let usable = !signals.is_empty() && signals.iter().all(|(_, s)| *s < limit);

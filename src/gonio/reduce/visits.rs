@@ -5,13 +5,10 @@
 
 use super::ReduceError;
 use super::positions;
-use super::stops::{Rate, Stop};
+use super::stops::{Rate, Stop, are_same, distinct};
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
 use crate::gonio::reading::Kind;
-
-/// By which share exposures may differ that are called the same.
-const SAME: f64 = 1e-9;
 
 /// What was read once, of one channel.
 #[derive(Debug, Clone, Copy)]
@@ -25,8 +22,8 @@ struct Point {
     exposure_s: f64,
     /// Number of the stop among those of its kind.
     visit: usize,
-    /// Of the stop and exposure.
-    number: usize,
+    /// Of its exposure, among those of blank or dark.
+    list: usize,
 }
 
 impl Point {
@@ -52,8 +49,9 @@ pub(super) struct Gap {
 /// A reading of blank or dark in a reading of the sample.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BasePart {
-    /// Its number.
-    pub number: usize,
+    /// Its number, and that of its exposure.
+    pub visit: usize,
+    pub list: usize,
     /// What the base at that moment has of it, and what the reference's net rate lost by it.
     pub direct: f64,
     pub through_reference: f64,
@@ -65,7 +63,7 @@ pub(super) struct BasePart {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ReferencePart {
     /// Its number.
-    pub number: usize,
+    pub visit: usize,
     /// Its share.
     pub share: f64,
     /// σ of its rate.
@@ -94,10 +92,10 @@ pub(super) struct At {
 pub(super) struct Visits {
     base: Vec<Base>,
     reference: Vec<Vec<Point>>,
-    /// Stops of the kind that has more.
-    count: usize,
     /// Whether there is a base, and a reference.
     pub has: [bool; 2],
+    /// What each reading has of the electronics, as described.
+    offset: f64,
 }
 
 /// Readings of blank or dark in one channel, by exposure, the longest first.
@@ -106,16 +104,16 @@ struct Base(Vec<Vec<Point>>);
 impl Base {
     /// From readings in order of time.
     fn new(all: &[Point]) -> Self {
-        let mut exposures: Vec<f64> = all.iter().map(|p| p.exposure_s).collect();
-        exposures.sort_by(|a, b| b.total_cmp(a));
-        exposures.dedup();
-        let of = |exposure: f64| all.iter().filter(|p| p.exposure_s == exposure).copied().collect();
-        Self(exposures.into_iter().map(of).collect())
+        let exposures = distinct(all.iter().map(|p| p.exposure_s));
+        let of = |(list, exposure): (usize, f64)| {
+            all.iter().filter(|p| are_same(p.exposure_s, exposure)).map(|p| Point { list, ..*p }).collect()
+        };
+        Self(exposures.into_iter().enumerate().map(of).collect())
     }
 
     /// Those that tell what a reading of this exposure has of them; none where there are none.
     fn of(&self, exposure_s: f64) -> &[Point] {
-        let same = |list: &&Vec<Point>| (list[0].exposure_s / exposure_s - 1.0).abs() < SAME;
+        let same = |list: &&Vec<Point>| are_same(list[0].exposure_s, exposure_s);
         self.0.iter().find(same).or(self.0.first()).map_or(&[], Vec::as_slice)
     }
 }
@@ -131,13 +129,11 @@ impl Visits {
             let of_kind: Vec<&Stop> = stops.iter().filter(|s| s.kind == kind).collect();
             let visits = of_kind.chunk_by(|a, b| a.number == b.number).enumerate();
             let numbered = visits.flat_map(|(visit, stops)| stops.iter().map(move |stop| (visit, stop)));
-            numbered
-                .enumerate()
-                .filter_map(|(number, (visit, stop))| {
-                    let Rate { mean, variance, signal, exposure_s } = stop.rates[c]?;
-                    Some(Point { time_s: stop.time_s, mean, variance, signal, exposure_s, visit, number })
-                })
-                .collect()
+            let point = |(visit, stop): (usize, &&Stop)| {
+                let Rate { mean, variance, signal, exposure_s } = stop.rates[c]?;
+                Some(Point { time_s: stop.time_s, mean, variance, signal, exposure_s, visit, list: 0 })
+            };
+            numbered.filter_map(point).collect()
         };
         // The blank where there is one, else the dark.
         let base =
@@ -147,16 +143,16 @@ impl Visits {
         let mut visits = Self {
             base: (0..width).map(|c| Base::new(&base(c))).collect(),
             reference: (0..width).map(|c| points(Kind::Reference, c)).collect(),
-            count: counts.into_iter().max().unwrap_or(0),
             has: [counts[0] + counts[1] > 0, counts[2] > 0],
+            offset: instrument.detector.offset,
         };
         visits.check(raw)?;
         let jitter = positions::of_reference(instrument, raw.dimension);
-        for (c, list) in visits.reference.iter_mut().enumerate() {
-            for point in list {
-                let net = point.mean - interpolated(visits.base[c].of(point.exposure_s), point.time_s).0;
-                point.variance += (jitter * net).powi(2);
-            }
+        let moved = |c: usize, point: &Point| (jitter * (point.mean - visits.under(c, point))).powi(2);
+        let all = visits.reference.iter().enumerate();
+        let variances: Vec<Vec<f64>> = all.map(|(c, list)| list.iter().map(|p| moved(c, p)).collect()).collect();
+        for (point, variance) in visits.reference.iter_mut().flatten().zip(variances.into_iter().flatten()) {
+            point.variance += variance;
         }
         Ok(visits)
     }
@@ -170,7 +166,7 @@ impl Visits {
                 return Err(ReduceError::UnreadableReference { channel: channel.clone() });
             }
             for point in &self.reference[c] {
-                let base = interpolated(self.base[c].of(point.exposure_s), point.time_s).0;
+                let base = self.under(c, point);
                 if point.mean <= base {
                     let (channel, time_s) = (channel.clone(), point.time_s);
                     return Err(ReduceError::DarkReference { channel, time_s, rate: point.mean, base });
@@ -180,9 +176,43 @@ impl Visits {
         Ok(())
     }
 
-    /// How many there are of the kind that was read most often.
-    pub fn len(&self) -> usize {
-        self.count
+    /// The base's rate in a reading of the reference.
+    fn under(&self, channel: usize, point: &Point) -> f64 {
+        let list = self.base[channel].of(point.exposure_s);
+        interpolated(list, point.time_s).0 + self.offset_beside(list, point.exposure_s)
+    }
+
+    /// By how much the rate of a described offset is larger in a reading of this exposure than in these of the base.
+    fn offset_beside(&self, list: &[Point], exposure_s: f64) -> f64 {
+        match list.first() {
+            Some(point) if are_same(point.exposure_s, exposure_s) => 0.0,
+            Some(point) => self.offset * (exposure_s.recip() - point.exposure_s.recip()),
+            None => self.offset / exposure_s,
+        }
+    }
+
+    /// Says so where blank or dark were read in several exposures, and not in that of what they are subtracted from.
+    pub fn unmatched(&self, stops: &[Stop]) -> Option<String> {
+        let of_stop = |stop: &Stop| {
+            let rates =
+                stop.rates.iter().enumerate().filter_map(|(c, rate)| Some((&self.base[c], rate.as_ref()?.exposure_s)));
+            let lone = |(base, exposure): &(&Base, f64)| {
+                base.0.len() > 1 && !are_same(base.of(*exposure)[0].exposure_s, *exposure)
+            };
+            let mut lone = rates.filter(lone);
+            lone.next().map(|(base, exposure)| (exposure, base.0[0][0].exposure_s))
+        };
+        let light = |stop: &&Stop| matches!(stop.kind, Kind::Sample | Kind::Reference);
+        let (exposure, longest) = stops.iter().filter(light).find_map(of_stop).filter(|_| self.offset == 0.0)?;
+        Some(format!(
+            "no blank or dark has the exposure of {exposure} s that others have: those of {longest} s are taken, and an electronic offset does not come off"
+        ))
+    }
+
+    /// How many there are of base and reference.
+    pub fn len(&self) -> [usize; 2] {
+        let last = |all: &mut dyn Iterator<Item = &Point>| all.map(|p| p.visit + 1).max().unwrap_or(0);
+        [last(&mut self.base.iter().flat_map(|b| b.0.iter().flatten())), last(&mut self.reference.iter().flatten())]
     }
 
     /// What they say of `time_s` and of this exposure: linear between two, the nearest before the first and after the last.
@@ -190,6 +220,7 @@ impl Visits {
         let (bases, reference_list) = (&self.base[channel], &self.reference[channel]);
         let base_list = bases.of(exposure_s);
         let (base, around, base_gap) = interpolated(base_list, time_s);
+        let base = base + self.offset_beside(base_list, exposure_s);
         let (mut base_parts, mut base_bent) = (Vec::with_capacity(4), 0.0);
         for (i, share) in around {
             base_bent += share * base_list[i].bent();
@@ -201,9 +232,10 @@ impl Visits {
             let point = reference_list[i];
             let base_list = bases.of(point.exposure_s);
             let (under, of_base, _) = interpolated(base_list, point.time_s);
+            let under = under + self.offset_beside(base_list, point.exposure_s);
             reference += share * (point.mean - under);
             reference_bent += share * point.bent();
-            reference_parts.push(ReferencePart { number: point.number, share, sigma: point.variance.sqrt() });
+            reference_parts.push(ReferencePart { visit: point.visit, share, sigma: point.variance.sqrt() });
             for (k, part) in of_base {
                 add_part(&mut base_parts, base_list, k, (0.0, share * part));
                 reference_bent -= share * part * base_list[k].bent();
@@ -246,13 +278,13 @@ impl IntoIterator for Around {
 
 /// Adds what a moment has of a reading of the base, directly and through the reference.
 fn add_part(parts: &mut Vec<BasePart>, list: &[Point], i: usize, (direct, through_reference): (f64, f64)) {
-    let Point { number, variance, .. } = list[i];
-    match parts.iter_mut().find(|part| part.number == number) {
+    let Point { visit, list, variance, .. } = list[i];
+    match parts.iter_mut().find(|part| (part.visit, part.list) == (visit, list)) {
         Some(part) => {
             part.direct += direct;
             part.through_reference += through_reference;
         }
-        None => parts.push(BasePart { number, direct, through_reference, sigma: variance.sqrt() }),
+        None => parts.push(BasePart { visit, list, direct, through_reference, sigma: variance.sqrt() }),
     }
 }
 
