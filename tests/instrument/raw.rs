@@ -162,12 +162,10 @@ fn what_is_subtracted_is_of_the_same_exposure() {
 fn a_visit_s_noise_is_shared_however_often_others_are_read() {
     let of = |blanks: usize| {
         let mut rows = ",,,,reference,0,1,0,3000\n,,,,reference,1,1,1,3000\n,,,,blank,2,1,0,10\n".to_owned();
-        for k in 0..60 {
-            rows += &format!("0,0,{k},0,sample,{},1,0,2000\n", 10 + 2 * k);
-            if k % (60 / blanks) == 0 {
-                rows += &format!(",,,,blank,{},1,0,10\n", 11 + 2 * k);
-            }
-        }
+        let sample = |k: usize| format!("0,0,{k},0,sample,{},1,0,2000\n", 10 + 2 * k);
+        let blank = |k: usize| format!(",,,,blank,{},1,0,10\n", 11 + 2 * k);
+        let of = |k: usize| if k.is_multiple_of(60 / blanks) { sample(k) + &blank(k) } else { sample(k) };
+        rows.extend((0..60).map(of));
         let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}{rows}")).expect("valid");
         let reference = Reference { reflectance: 0.98, ..Reference::default() };
         let instrument = Instrument { electrons: 1e4, reference, ..Instrument::default() };
