@@ -301,7 +301,7 @@ impl<S: Simd> Lanes<S> {
         ((two | three).select(-s, s), (one | two).select(-c, c))
     }
 
-    /// The angle of (x, y) = (`x`, self) in [0, 2π), radians, to 1e-15.
+    /// The angle of (x, y) = (`x`, self) in [0, 2π], radians, to 1e-15.
     #[inline(always)]
     pub fn angle_of(self, x: Self) -> Self {
         let y = self;
@@ -355,7 +355,7 @@ const COS: [f64; 10] = [
     -0.5,
     1.0,
 ];
-/// (atan(x)/x − 1)/x² to 5e-18 up to x = tan(π/8), in powers of x² from the tenth down: its interpolation at Chebyshev's points.
+/// (atan(x)/x − 1)/x² to 5e-17, so the arc to 3e-18, up to x = tan(π/8), in powers of x² from the tenth down: its interpolation at Chebyshev's points.
 const ARC: [f64; 11] = [
     -0.019_175_404_711_104_935,
     0.039_230_447_784_793_09,
@@ -522,8 +522,13 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> [f64; LANES] {
+            // The last register has them the other way round.
             let mut row = [5.0; LANES];
             row[..8].copy_from_slice(&[-3.0, -0.0, 0.0, 1.0, 2.0, f64::NAN, f64::INFINITY, 5.0]);
+            row.copy_within(..8, LANES - 8);
+            row[LANES - 8..].reverse();
+            let lone = Lanes::load(simd, &std::array::from_fn(|lane| f64::from(u8::from(lane == LANES - 3))));
+            assert!(lone.above(lone.number(0.5)).any() && !lone.above(lone.number(1.5)).any());
             let x = Lanes::load(simd, &row);
             let zero = x.number(0.0);
             let positive = x.above(zero);
@@ -541,5 +546,8 @@ mod tests {
         let out = vectorised(Choices);
         let want = [3.0, 0.0, 0.0, 1.0, f64::sqrt(2.0), 7.0, f64::INFINITY, f64::sqrt(5.0)];
         assert_eq!(out.map(f64::abs)[..8], want);
+        let mut last: Vec<f64> = out[LANES - 8..].iter().map(|x| x.abs()).collect();
+        last.reverse();
+        assert_eq!(last, want);
     }
 }

@@ -79,7 +79,7 @@ pub struct Drawn {
     pub rows: (usize, usize),
     /// With which probability.
     pub probability: f64,
-    /// The numbers that it was drawn with, from 0 to 1 again.
+    /// The numbers that it was drawn with, from 0 to 1 again, 1 included.
     pub u: DVec2,
 }
 
