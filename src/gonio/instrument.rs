@@ -288,10 +288,10 @@ mod tests {
                 |i| i.detector.full_well = 1e-13,
                 "instrument.detector.full_well: expected 0 (never saturates) or a number from 1e-12 to 1e18",
             ),
-            // Five times a read noise of 10 over 1 − 4·0.1.
+            // Five times a read noise of 10 over 1 − 4/8.
             (
-                |i| (i.detector.full_well, i.detector.nonlinearity_u) = (80.0, 0.1),
-                "instrument.detector.full_well: expected more than 83.33333333333333 (offset",
+                |i| (i.detector.full_well, i.detector.nonlinearity_u) = (80.0, 0.125),
+                "instrument.detector.full_well: expected more than 100 (offset",
             ),
             (
                 |i| i.detector.nonlinearity_u = 0.3,
