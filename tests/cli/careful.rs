@@ -173,13 +173,15 @@ fn directions_below_the_horizon_are_counted() {
     let ran =
         b.ok(&["simulate", "--material", "satin", "--scan", "list:one.csv", "--raw", "raw.csv", "--out", "x.csv"]);
     assert!(ran.err.is_empty() && ran.text().contains("1 direction pair, 3 valid"), "{} {}", ran.err, ran.text());
-    assert!(b.ok(&["reduce", "raw.csv", "--out", "x.csv"]).text().contains("1 reading of 1 pair of directions"));
+    assert!(
+        b.ok(&["reduce", "raw.csv", "--out", "x.csv"]).text().contains("reduced from 1 reading; 1 pair of directions")
+    );
 }
 
 #[test]
 fn a_measurement_without_any_value_is_a_failure_that_says_why() {
     let b = Bench::new();
-    b.write("well.toml", "version = 1\n[instrument.detector]\nfull_well = 1\nbits = 1\n");
+    b.write("well.toml", "version = 1\n[instrument.detector]\nfull_well = 60\nbits = 8\n");
     let by_well = simulated(&["--instrument", "well.toml", "--raw", "raw.csv", "--out", "x.csv"]);
     b.write("down.csv", "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg\n0,0,95,0\n");
     for (args, why) in [

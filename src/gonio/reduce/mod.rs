@@ -22,7 +22,7 @@ use glam::DVec3;
 pub use budget::{Budget, Line, Type};
 pub(super) use stops::limit as saturation_limit;
 
-use self::noise::Noise;
+use self::noise::{Noise, readings};
 use self::shared::Shared;
 use self::stops::{Rate, Stop};
 use self::visits::Visits;
@@ -226,7 +226,7 @@ impl Work<'_> {
         let marked = table.values.iter().filter(|v| v.is_nan()).count() as u64;
         let measurement = Measurement {
             notes,
-            origin: format!("reduced from {} readings{}", self.raw.readings.len(), self.noise.said()),
+            origin: format!("reduced from {}{}", readings(self.raw.readings.len()), self.noise.said()),
             dimension: self.raw.dimension,
             weights: self.raw.weights.clone(),
             masked: Masked { marked, ..Masked::default() },
