@@ -218,8 +218,8 @@ impl Curve {
 /// Whether these repeats scatter as none by this noise would, by steps, between two of which they may fall either way, and by what walks meanwhile, whose
 /// squares scatter widely.
 pub(super) fn has_strayed(noise: f64, step: f64, of: &Repeats, instrument: &Instrument) -> bool {
-    let (freedom, most) =
-        (of.count as f64 - 1.0, noise + 0.25 * step * step * of.count as f64 / (of.count as f64 - 1.0));
+    let count = of.count as f64;
+    let (freedom, most) = (count - 1.0, noise + 0.25 * step * step * count / (count - 1.0));
     let scatter = of.scatter - WALKS * of.walked(instrument);
     freedom > 0.0 && scatter > most && chi_square_p(freedom * scatter / most, freedom) < STRAYED
 }

@@ -22,7 +22,7 @@ use glam::DVec3;
 pub use budget::{Budget, Line, Type};
 pub(super) use stops::limit as saturation_limit;
 
-use self::noise::{Noise, readings};
+use self::noise::Noise;
 use self::shared::Shared;
 use self::stops::{Rate, Stop};
 use self::visits::Visits;
@@ -34,6 +34,7 @@ use super::raw::Raw;
 use super::reading::Kind;
 use super::simulate::Truth;
 use super::spot::Spot;
+use crate::control::counted;
 use crate::measurement::{Dimension, Masked, Measurement};
 
 /// Why raw readings can't be reduced.
@@ -226,7 +227,7 @@ impl Work<'_> {
         let marked = table.values.iter().filter(|v| v.is_nan()).count() as u64;
         let measurement = Measurement {
             notes,
-            origin: format!("reduced from {}{}", readings(self.raw.readings.len()), self.noise.said()),
+            origin: format!("reduced from {}{}", counted(self.raw.readings.len() as u64, "reading"), self.noise.said()),
             dimension: self.raw.dimension,
             weights: self.raw.weights.clone(),
             masked: Masked { marked, ..Masked::default() },

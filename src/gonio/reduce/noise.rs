@@ -2,7 +2,6 @@
 
 use super::scatter::Scatter;
 use super::stops::{Repeats, Summary, before_rounding, rounding};
-use crate::control::counted;
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
@@ -159,9 +158,4 @@ impl Described {
         }
         tally
     }
-}
-
-/// "3 readings", for messages.
-pub(super) fn readings(count: usize) -> String {
-    counted(count as u64, "reading")
 }

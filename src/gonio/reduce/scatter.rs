@@ -7,8 +7,8 @@
 //! place: with a, b, c ≥ 0 the variance is convex, and grows as S² at most.
 
 use super::curve::{Curve, has_strayed};
-use super::noise::readings;
 use super::stops::{Repeats, Summary, are_same};
+use crate::control::counted;
 use crate::gonio::effects::quantisation::step;
 use crate::gonio::instrument::Instrument;
 use crate::gonio::raw::Raw;
@@ -50,10 +50,7 @@ impl Scatter {
                 return Err(said(format!("signals of {signal:.3e} above the blank have none")));
             }
             let far = FAR * curve.levels.iter().map(|l| l.0).fold(0.0, f64::max);
-            let samples = || {
-                let of = summaries.iter().filter(|s| s.kind == Kind::Sample);
-                of.filter_map(|s| s.repeats[c].as_ref()).map(|r| net(&base, r))
-            };
+            let samples = || repeats_of(Kind::Sample, summaries, c).map(|r| net(&base, r));
             if 2 * samples().filter(|s| *s > far).count() > samples().count() {
                 return Err(format!(
                     "most signals of the sample are above {far:.3e} in channel {name}, {FAR} times the largest that was repeated"
@@ -104,7 +101,7 @@ impl Scatter {
         let limit = (limits > 0).then(|| {
             format!(
                 "σ of {} is an upper limit: no signal like theirs was repeated, and noise is taken to grow as the signal at most",
-                readings(limits)
+                counted(limits as u64, "reading")
             )
         });
         let stray = (strayed > 0).then(|| {
@@ -118,10 +115,15 @@ impl Scatter {
     }
 }
 
+/// All repeats of a kind in one channel.
+fn repeats_of(kind: Kind, summaries: &[Summary], c: usize) -> impl Iterator<Item = &Repeats> {
+    summaries.iter().filter(move |s| s.kind == kind).filter_map(move |s| s.repeats[c].as_ref())
+}
+
 /// Says so where several stops read the largest signal of the log to its last digit: a detector that takes no more, most likely.
 fn clipped(raw: &Raw, summaries: &[Summary]) -> Option<String> {
     let of = |c: usize| {
-        let samples = || summaries.iter().filter(|s| s.kind == Kind::Sample).filter_map(move |s| s.repeats[c].as_ref());
+        let samples = || repeats_of(Kind::Sample, summaries, c);
         let most = samples().map(|r| r.signal).fold(f64::NEG_INFINITY, f64::max);
         let count = samples().filter(|r| r.signal == most && r.scatter == 0.0).count();
         (count >= CLIPPED).then(|| {
@@ -138,7 +140,7 @@ fn clipped(raw: &Raw, summaries: &[Summary]) -> Option<String> {
 fn base(summaries: &[Summary], c: usize) -> Vec<(f64, f64)> {
     let of = |kind: Kind| {
         let mut sums: Vec<(f64, f64, f64)> = Vec::new();
-        for r in summaries.iter().filter(|s| s.kind == kind).filter_map(|s| s.repeats[c].as_ref()) {
+        for r in repeats_of(kind, summaries, c) {
             let count = r.count as f64;
             match sums.iter_mut().find(|s| are_same(s.0, r.exposure_s)) {
                 Some(sum) => (sum.1, sum.2) = (sum.1 + count * r.signal, sum.2 + count),

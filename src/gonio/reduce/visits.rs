@@ -178,8 +178,14 @@ impl Visits {
 
     /// The base's rate in a reading of the reference.
     fn under(&self, channel: usize, point: &Point) -> f64 {
-        let list = self.base[channel].of(point.exposure_s);
-        interpolated(list, point.time_s).0 + self.offset_beside(list, point.exposure_s)
+        self.base_at(channel, point.time_s, point.exposure_s).0
+    }
+
+    /// The base's rate at a moment in a reading of this exposure, what it is made from with its list, and where the moment lies.
+    fn base_at(&self, channel: usize, time_s: f64, exposure_s: f64) -> (f64, (&[Point], Around), Gap) {
+        let list = self.base[channel].of(exposure_s);
+        let (rate, around, gap) = interpolated(list, time_s);
+        (rate + self.offset_beside(list, exposure_s), (list, around), gap)
     }
 
     /// By how much the rate of a described offset is larger in a reading of this exposure than in these of the base.
@@ -217,10 +223,8 @@ impl Visits {
 
     /// What they say of `time_s` and of this exposure: linear between two, the nearest before the first and after the last.
     pub fn at(&self, time_s: f64, channel: usize, exposure_s: f64) -> At {
-        let (bases, reference_list) = (&self.base[channel], &self.reference[channel]);
-        let base_list = bases.of(exposure_s);
-        let (base, around, base_gap) = interpolated(base_list, time_s);
-        let base = base + self.offset_beside(base_list, exposure_s);
+        let reference_list = &self.reference[channel];
+        let (base, (base_list, around), base_gap) = self.base_at(channel, time_s, exposure_s);
         let (mut base_parts, mut base_bent) = (Vec::with_capacity(4), 0.0);
         for (i, share) in around {
             base_bent += share * base_list[i].bent();
@@ -230,9 +234,7 @@ impl Visits {
         let (_, around, reference_gap) = interpolated(reference_list, time_s);
         for (i, share) in around {
             let point = reference_list[i];
-            let base_list = bases.of(point.exposure_s);
-            let (under, of_base, _) = interpolated(base_list, point.time_s);
-            let under = under + self.offset_beside(base_list, point.exposure_s);
+            let (under, (base_list, of_base), _) = self.base_at(channel, point.time_s, point.exposure_s);
             reference += share * (point.mean - under);
             reference_bent += share * point.bent();
             reference_parts.push(ReferencePart { visit: point.visit, share, sigma: point.variance.sqrt() });
