@@ -9,7 +9,7 @@ use super::RenderError;
 use super::camera::Camera;
 use super::integrator::{PathResult, Strategy, Tracer, Watch};
 use super::layers::{Gathered, LayerSet, Sight, layer};
-use super::noise::{Noise, PictureError, relative_squares, standard_errors};
+use super::noise::{DOUBT_OF_ONE, Noise, PictureError, relative_squares, standard_errors};
 use super::packet::{FlatScene, Packets};
 use super::pixel::Pixel;
 use super::plan::Plan;
@@ -123,6 +123,8 @@ pub struct Film {
     layers: LayerSet,
     /// One for each pixel where there are layers, else none.
     gathered: Vec<Gathered>,
+    /// The chance that the bound of its error doesn't hold.
+    doubt: f64,
 }
 
 impl Film {
@@ -163,7 +165,7 @@ impl Film {
     /// How far off the picture is, as far as its noise says; `None` where a pixel has fewer than two samples.
     #[must_use]
     pub fn error(&self) -> Option<PictureError> {
-        (self.samples() >= 2).then(|| Noise::all(&self.noise()).error())
+        (self.samples() >= 2).then(|| Noise::all(&self.noise()).error(self.doubt))
     }
 
     /// How far the picture is off another of its size, which stands for the truth, measured as [`PictureError`] is; pixels that one of them lacks
@@ -262,6 +264,7 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         pixels: filled(options, room)?,
         layers: options.layers,
         gathered: if options.layers.is_empty() { Vec::new() } else { filled(options, room)? },
+        doubt: DOUBT_OF_ONE,
     };
     let camera = Camera::new(&scene.camera, scene.origin, scene.filter, options.width, options.height);
     let flat = FlatScene::of(scene).filter(|_| plan.packets);
@@ -287,9 +290,10 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         if !over {
             let noise = if schedule.adapts() { film.noise() } else { Vec::new() };
             if schedule.adapts() {
-                state = format!("error {:.2} %", 100.0 * Noise::all(&noise).error().relative);
+                state = format!("error {:.2} %", 100.0 * Noise::all(&noise).error(film.doubt).relative);
             }
             more = schedule.next(&noise);
+            film.doubt = schedule.doubt();
         }
     }
     control.progress.finish();

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::pixel::Pixel;
 use super::tiles::{TILE, Tile};
-use crate::numeric::stats::chi_square_quantile;
+use crate::numeric::stats::{chi_square_quantile, normal_quantile};
 
 /// A relative error counts against the radiance where it is above this share of the picture's mean, else against that.
 const DARK: f64 = 0.1;
@@ -133,8 +133,8 @@ impl Noise {
         3.0 * self.pixels as f64
     }
 
-    /// The picture's error.
-    pub fn error(&self) -> PictureError {
+    /// The picture's error; its bound holds but for a chance of `doubt`.
+    pub fn error(&self, doubt: f64) -> PictureError {
         let relative = (self.sum / self.values()).sqrt();
         if self.sum <= 0.0 {
             return PictureError { relative, at_most: relative };
@@ -144,12 +144,22 @@ impl Noise {
         // picture is off by scatters about what was to be expected too.
         let freedom = 0.5 * (3.0 * self.sum * self.sum / self.squares).min(self.pixels as f64);
         let factor = if freedom < 1000.0 {
-            freedom / chi_square_quantile(0.05, freedom)
+            freedom / chi_square_quantile(doubt, freedom)
         } else {
-            1.0 + 1.645 * (2.0 / freedom).sqrt()
+            1.0 + normal_quantile(1.0 - doubt) * (2.0 / freedom).sqrt()
         };
         PictureError { relative, at_most: relative * factor.sqrt() }
     }
+}
+
+/// What [`PictureError::at_most`] may be wrong with, of a picture that is judged once.
+pub(super) const DOUBT_OF_ONE: f64 = 0.05;
+
+/// The same at look `k` = 1, 2, … of a picture that is done at the first look that is good enough: one that underrates the error would end the work, so
+/// that all looks share [`DOUBT_OF_ONE`], 1/(k(k + 1)) of it each.
+pub(super) fn doubt_at(look: u32) -> f64 {
+    let k = f64::from(look.max(1));
+    DOUBT_OF_ONE / (k * (k + 1.0))
 }
 
 /// How far off a picture is: the root of the mean, over pixels and channels, of (x − truth)²/(truth² + (L̄/10)²), L̄ being the picture's mean radiance.

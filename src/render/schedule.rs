@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::film::Options;
-use super::noise::{Noise, PictureError};
+use super::noise::{DOUBT_OF_ONE, Noise, PictureError, doubt_at};
 
 /// Samples of the first round where later ones depend on it.
 const FIRST: u32 = 16;
@@ -23,17 +23,24 @@ pub(super) struct Schedule {
     deadline: Option<Instant>,
     /// Samples that tiles have, which all pixels of a tile share.
     have: Vec<u32>,
+    /// How often the picture was looked at.
+    looks: u32,
 }
 
 impl Schedule {
     pub fn new(options: &Options, tiles: usize, start: Instant) -> Self {
         let (target, deadline) = (options.target_error, options.deadline);
-        Self { most: options.samples, target, start, deadline, have: vec![0; tiles] }
+        Self { most: options.samples, target, start, deadline, have: vec![0; tiles], looks: 0 }
     }
 
     /// Whether rounds depend on what earlier ones found.
     pub fn adapts(&self) -> bool {
         self.target.is_some() || self.deadline.is_some()
+    }
+
+    /// What the bound of the picture's error may be wrong with.
+    pub fn doubt(&self) -> f64 {
+        if self.target.is_some() { doubt_at(self.looks) } else { DOUBT_OF_ONE }
     }
 
     /// When work ends, at the latest.
@@ -62,17 +69,18 @@ impl Schedule {
     }
 
     /// What the next round brings every tile, whose errors are `noise`; `None` where the picture is done.
-    pub fn next(&self, noise: &[Noise]) -> Option<Vec<u32>> {
+    pub fn next(&mut self, noise: &[Noise]) -> Option<Vec<u32>> {
         if !self.adapts() {
             let done = self.have.first().copied().unwrap_or(0);
             let pass = done.clamp(1, 32).min(self.most - done);
             return (pass > 0).then(|| vec![pass; self.have.len()]);
         }
+        self.looks += 1;
         let all = Noise::all(noise);
         if all.sum.is_nan() {
             return None; // no samples mend a value that is no number
         }
-        if self.target.is_some_and(|target| all.error().at_most <= target) {
+        if self.target.is_some_and(|target| all.error(self.doubt()).at_most <= target) {
             return None;
         }
         let total: f64 = self.have.iter().map(|n| f64::from(*n)).sum();
@@ -87,7 +95,7 @@ impl Schedule {
                 return None;
             }
         }
-        let wanted = self.shares(noise, &all.error(), affordable + total);
+        let wanted = self.shares(noise, &all.error(doubt_at(self.looks + 1)), affordable + total);
         let mut more: Vec<u32> = wanted.iter().zip(&self.have).map(|(want, have)| self.portion(*want, *have)).collect();
         if more.iter().all(|n| *n == 0) {
             // The plan's aim is met but not surely enough, or nothing varies: some more everywhere.

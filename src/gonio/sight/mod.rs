@@ -176,15 +176,7 @@ impl Cones {
 
     /// A lobe of weight 1 as it is read from one point of the spot at α, q = cosθi/cosθo being `q`, 1/sr, and its derivative by n.
     fn read(&self, seen: Option<&Seen>, n: f64, alpha: f64, q: f64) -> (f64, f64) {
-        let [value, slope] = seen.map_or_else(
-            || power_of_alpha(n, alpha),
-            |seen| {
-                let [u, w, du, dw] = seen.at(alpha);
-                [u + q * w, du + q * dw]
-            },
-        );
-        let scale = 1.0 / (TAU * self.mean_cos());
-        ((n + 2.0) * scale * value, ((n + 2.0) * slope + value) * scale)
+        self.scaled(n, bare(seen, n, alpha, q))
     }
 
     /// The mean of [`Self::read`] over the spot, what reflects more light counting more; that of the middle without points.
@@ -192,10 +184,17 @@ impl Cones {
         if seats.is_empty() {
             return self.read(seen, n, place.alpha, place.ratio);
         }
-        seats.iter().fold((0.0, 0.0), |sums, seat| {
-            let (value, slope) = self.read(seen, n, seat.alpha, seat.ratio);
+        let sums = seats.iter().fold((0.0, 0.0), |sums, seat| {
+            let (value, slope) = bare(seen, n, seat.alpha, seat.ratio);
             (sums.0 + seat.weight * value, sums.1 + seat.weight * slope)
-        })
+        });
+        self.scaled(n, sums)
+    }
+
+    /// A mean of cosⁿα and its derivative by n as those of the lobe that is read.
+    fn scaled(&self, n: f64, (value, slope): (f64, f64)) -> (f64, f64) {
+        let scale = 1.0 / (TAU * self.mean_cos());
+        ((n + 2.0) * scale * value, ((n + 2.0) * slope + value) * scale)
     }
 
     /// The order of the rule over the spot that a lobe asks for; `None` where the middle tells all: without a spot, and where the lobe is nothing.
@@ -218,6 +217,13 @@ impl Cones {
             _ => Vec::new(),
         }
     }
+}
+
+/// U + q W at α, and its derivative by n.
+fn bare(seen: Option<&Seen>, n: f64, alpha: f64, q: f64) -> (f64, f64) {
+    let Some(seen) = seen else { return power_of_alpha(n, alpha).into() };
+    let [u, w, du, dw] = seen.at(alpha);
+    (u + q * w, du + q * dw)
 }
 
 impl Sight for Cones {

@@ -39,7 +39,7 @@ impl MeshLight {
 
     /// Light that arrives at a point from a point of a triangle; `None` where the point is behind that triangle.
     pub fn sample(&self, at: &SurfacePoint, u: DVec2) -> Option<Arrival> {
-        let (part, ux) = pick(&self.areas, 0.0, u.x);
+        let (part, ux) = pick(&self.areas, u.x);
         let corners = self.triangles.get(part)?;
         let seen = SphericalTriangle::new(corners, at.position);
         let (b1, b2) = if seen.solid_angle > SMALL_SOLID_ANGLE {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::super::bvh::Bvh;
+use super::super::bvh::{Bvh, Contents};
 use super::super::ray::{Ray, SurfacePoint, gamma};
 use super::triangles::{TriangleHit, Triangles};
 use super::{Mesh, Owner, Surface};
@@ -81,7 +81,7 @@ impl Instances {
         if items.is_empty() {
             return None;
         }
-        let (bvh, order) = Bvh::new(&boxes);
+        let (bvh, order) = Bvh::new(&boxes, 1);
         Some(Self { bvh, items: order.iter().map(|i| items[*i as usize].clone()).collect() })
     }
 
@@ -92,24 +92,14 @@ impl Instances {
 
     /// The instance and its triangle that the ray meets first, with the distance in the scene.
     pub fn closest(&self, ray: &Ray) -> Option<(f64, usize, TriangleHit)> {
-        let mut found = None;
-        self.bvh.traverse(ray, false, |index, t_max| {
-            let (placement, mesh) = &self.items[index];
-            let hit = mesh.closest(&placement.ray_inside(&Ray { t_max, ..*ray }))?;
-            let t = (hit.t * placement.scale).min(t_max); // rounding must not carry it past what was found before
-            found = Some((t, index, hit));
-            Some(t)
-        });
-        found
+        let mut search = Search { of: self, ray, found: None };
+        self.bvh.traverse::<false>(ray, &mut search);
+        search.found
     }
 
     /// Whether a triangle, seen from either side, lies on the ray.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let hides = |index: usize, t_max: f64| {
-            let (placement, mesh) = &self.items[index];
-            mesh.occluded(&placement.ray_inside(&Ray { t_max, ..*ray })).then_some(t_max)
-        };
-        self.bvh.traverse(ray, true, hides).is_some()
+        self.bvh.traverse::<true>(ray, &mut Hiding { of: self, ray })
     }
 
     /// The surface where a ray met a triangle of an instance.
@@ -121,6 +111,49 @@ impl Instances {
             shading_normal: placement.turn(inside.shading_normal),
             owner: inside.owner,
         }
+    }
+}
+
+impl Instances {
+    /// Those of a leaf, with their places.
+    fn of_leaf(&self, leaf: usize) -> impl Iterator<Item = (usize, &(Placement, Arc<Triangles>))> {
+        let (first, count) = self.bvh.leaves()[leaf];
+        self.items.iter().enumerate().skip(first as usize).take(count as usize)
+    }
+}
+
+/// The search for the triangle that a ray meets first.
+struct Search<'a> {
+    of: &'a Instances,
+    ray: &'a Ray,
+    found: Option<(f64, usize, TriangleHit)>,
+}
+
+impl Contents for Search<'_> {
+    fn meet(&mut self, leaf: usize, mut t_max: f64) -> Option<f64> {
+        let mut nearer = None;
+        for (index, (placement, mesh)) in self.of.of_leaf(leaf) {
+            let Some(hit) = mesh.closest(&placement.ray_inside(&Ray { t_max, ..*self.ray })) else { continue };
+            t_max = (hit.t * placement.scale).min(t_max); // rounding must not carry it past what was found before
+            self.found = Some((t_max, index, hit));
+            nearer = Some(t_max);
+        }
+        nearer
+    }
+}
+
+/// The search for anything on a ray.
+struct Hiding<'a> {
+    of: &'a Instances,
+    ray: &'a Ray,
+}
+
+impl Contents for Hiding<'_> {
+    fn meet(&mut self, leaf: usize, t_max: f64) -> Option<f64> {
+        let hides = |(placement, mesh): &(Placement, Arc<Triangles>)| {
+            mesh.occluded(&placement.ray_inside(&Ray { t_max, ..*self.ray }))
+        };
+        self.of.of_leaf(leaf).any(|(_, item)| hides(item)).then_some(t_max)
     }
 }
 

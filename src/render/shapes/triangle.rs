@@ -25,6 +25,40 @@ impl ShearedRay {
         Self { origin: ray.origin, direction: d, axis, shear }
     }
 
+    /// Which of the triangles may be met, as bits: all that [`ShearedRay::hit`] meets are among them, for the edges' functions are worked out as there, and
+    /// two of opposite signs rule a triangle out.
+    #[inline(always)]
+    pub fn may_meet(&self, four: &Four) -> u32 {
+        let (a, b, c) = (self.sheared(four, 0), self.sheared(four, 1), self.sheared(four, 2));
+        let mut bits = [0; SIDE_BY_SIDE];
+        for k in 0..SIDE_BY_SIDE {
+            let u = c[0][k] * b[1][k] - c[1][k] * b[0][k];
+            let v = a[0][k] * c[1][k] - a[1][k] * c[0][k];
+            let w = b[0][k] * a[1][k] - b[1][k] * a[0][k];
+            let (least, most) = (lesser(lesser(u, v), w), -lesser(lesser(-u, -v), -w));
+            bits[k] = if least * most < 0.0 { 0 } else { BITS[k] };
+        }
+        bits.iter().fold(0, |all, bit| all | bit) & ((1 << four.count) - 1)
+    }
+
+    /// x and y of [`ShearedRay::apply`] of a corner of each.
+    #[inline(always)]
+    fn sheared(&self, four: &Four, corner: usize) -> [[f64; SIDE_BY_SIDE]; 2] {
+        let (x, y, z) = match self.axis {
+            0 => (1, 2, 0),
+            1 => (2, 0, 1),
+            _ => (0, 1, 2),
+        };
+        let at = &four.corners[corner];
+        let mut sheared = [[0.0; SIDE_BY_SIDE]; 2];
+        for k in 0..SIDE_BY_SIDE {
+            let along = at[z][k] - self.origin[z];
+            sheared[0][k] = at[x][k] - self.origin[x] - self.shear.x * along;
+            sheared[1][k] = at[y][k] - self.origin[y] - self.shear.y * along;
+        }
+        sheared
+    }
+
     #[inline]
     fn apply(&self, p: DVec3) -> DVec3 {
         let q = turned(p - self.origin, self.axis);
@@ -61,6 +95,57 @@ impl ShearedRay {
         let (ahead, along) = (normal.dot(*a - self.origin), normal.dot(self.direction));
         (ahead > 0.0 && along > 0.0) || (ahead < 0.0 && along < 0.0)
     }
+}
+
+/// Triangles of a [`Four`].
+pub const SIDE_BY_SIDE: usize = 4;
+
+/// A bit for each.
+const BITS: [u32; SIDE_BY_SIDE] = [1, 2, 4, 8];
+
+/// Up to four triangles side by side.
+#[derive(Debug, Clone)]
+pub struct Four {
+    /// By corner and axis.
+    corners: [[[f64; SIDE_BY_SIDE]; 3]; 3],
+    count: usize,
+}
+
+impl Four {
+    /// Of so many triangles or fewer.
+    pub fn new(triangles: &[[DVec3; 3]]) -> Self {
+        debug_assert!(triangles.len() <= SIDE_BY_SIDE);
+        let mut four = Self { corners: Default::default(), count: triangles.len().min(SIDE_BY_SIDE) };
+        for (lane, triangle) in triangles.iter().enumerate().take(SIDE_BY_SIDE) {
+            for (corner, p) in triangle.iter().enumerate() {
+                (0..3).for_each(|axis| four.corners[corner][axis][lane] = p[axis]);
+            }
+        }
+        four
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Corners of one of them.
+    #[inline(always)]
+    pub fn corners(&self, lane: usize) -> [DVec3; 3] {
+        let [a, b, c] = &self.corners;
+        [self::at(a, lane), self::at(b, lane), self::at(c, lane)]
+    }
+}
+
+/// The lesser of two, in one instruction.
+#[inline(always)]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn at(axes: &[[f64; SIDE_BY_SIDE]; 3], lane: usize) -> DVec3 {
+    DVec3::new(axes[0][lane], axes[1][lane], axes[2][lane])
 }
 
 /// The axes in turn, so that this one becomes z. The winding stays; a ray that runs backwards sees it reversed, and both sides are met.

@@ -2,16 +2,17 @@
 
 use glam::DVec3;
 
-use super::super::bvh::Bvh;
+use super::super::bvh::{Bvh, Contents};
 use super::super::ray::Ray;
-use super::triangle::{self, ShearedRay};
+use super::triangle::{self, Four, ShearedRay};
 use super::{Mesh, Owner, Surface};
 
 /// The triangles of meshes, in the order of their hierarchy.
 #[derive(Debug)]
 pub struct Triangles {
     bvh: Bvh,
-    corners: Vec<[DVec3; 3]>,
+    /// Those of each leaf, and the place of the first.
+    blocks: Vec<(Four, usize)>,
     /// Unit normals at the corners; empty where all faces are flat.
     normals: Vec<Option<[DVec3; 3]>>,
     owners: Vec<Owner>,
@@ -22,7 +23,8 @@ pub struct Triangles {
 pub struct TriangleHit {
     /// Distance, m.
     pub t: f64,
-    index: usize,
+    leaf: usize,
+    lane: usize,
     b1: f64,
     b2: f64,
 }
@@ -44,14 +46,19 @@ impl Triangles {
         }
         let boxes: Vec<_> =
             corners.iter().map(|[a, b, c]: &[DVec3; 3]| (a.min(*b).min(*c), a.max(*b).max(*c))).collect();
-        let (bvh, order) = Bvh::new(&boxes);
+        let (bvh, order) = Bvh::new(&boxes, triangle::SIDE_BY_SIDE as u32);
         if normals.iter().all(Option::is_none) {
             normals.clear();
         }
         let sorted = |i: &u32| *i as usize;
+        let block = |(first, count): &(u32, u32)| {
+            let (first, count) = (*first as usize, *count as usize);
+            let corners: Vec<_> = order[first..first + count].iter().map(|i| corners[sorted(i)]).collect();
+            (Four::new(&corners), first)
+        };
         Some(Self {
+            blocks: bvh.leaves().iter().map(block).collect(),
             bvh,
-            corners: order.iter().map(|i| corners[sorted(i)]).collect(),
             normals: order.iter().filter_map(|i| normals.get(sorted(i)).copied()).collect(),
             owners: order.iter().map(|i| owners[sorted(i)]).collect(),
         })
@@ -59,34 +66,56 @@ impl Triangles {
 
     /// The triangle that the ray meets first.
     pub fn closest(&self, ray: &Ray) -> Option<TriangleHit> {
-        let sheared = ShearedRay::new(ray);
-        let mut found = None;
-        self.bvh.traverse(ray, false, |index, t_max| {
-            let (t, b1, b2) = sheared.hit(&self.corners[index], t_max)?;
-            found = Some(TriangleHit { t, index, b1, b2 });
-            Some(t)
-        });
-        found
+        let mut search = Search { blocks: &self.blocks, ray: ShearedRay::new(ray), found: None };
+        self.bvh.traverse::<false>(ray, &mut search);
+        search.found
     }
 
     /// Whether a triangle, seen from either side, lies on the ray.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let sheared = ShearedRay::new(ray);
-        self.bvh.traverse(ray, true, |i, t_max| Some(sheared.hit(&self.corners[i], t_max)?.0)).is_some()
+        let mut search = Search { blocks: &self.blocks, ray: ShearedRay::new(ray), found: None };
+        self.bvh.traverse::<true>(ray, &mut search)
     }
 
     /// The surface where a ray met a triangle.
     pub fn surface(&self, hit: &TriangleHit) -> Surface {
         let (b1, b2) = (hit.b1, hit.b2);
-        let point = triangle::surface(&self.corners[hit.index], b1, b2);
-        let normals = self.normals.get(hit.index).copied().flatten();
+        let (four, first) = &self.blocks[hit.leaf];
+        let index = first + hit.lane;
+        let point = triangle::surface(&four.corners(hit.lane), b1, b2);
+        let normals = self.normals.get(index).copied().flatten();
         let smooth = normals.and_then(|[n0, n1, n2]| ((1.0 - b1 - b2) * n0 + b1 * n1 + b2 * n2).try_normalize());
-        Surface { point, shading_normal: smooth.unwrap_or(point.normal), owner: self.owners[hit.index] }
+        Surface { point, shading_normal: smooth.unwrap_or(point.normal), owner: self.owners[index] }
     }
 
     /// The box of all triangles: its lowest and its highest corner.
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        let all = self.corners.iter().flatten();
-        all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)))
+        let all = self.blocks.iter().flat_map(|(four, _)| (0..four.count()).flat_map(|lane| four.corners(lane)));
+        all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+    }
+}
+
+/// The search for the triangle that a ray meets first.
+struct Search<'a> {
+    blocks: &'a [(Four, usize)],
+    ray: ShearedRay,
+    found: Option<TriangleHit>,
+}
+
+impl Contents for Search<'_> {
+    #[inline(always)]
+    fn meet(&mut self, leaf: usize, t_max: f64) -> Option<f64> {
+        let four = &self.blocks[leaf].0;
+        let (mut near, mut found) = (t_max, None);
+        let mut maybe = self.ray.may_meet(four);
+        while maybe != 0 {
+            let lane = maybe.trailing_zeros() as usize;
+            maybe &= maybe - 1;
+            if let Some((t, b1, b2)) = self.ray.hit(&four.corners(lane), near) {
+                (near, found) = (t, Some(TriangleHit { t, leaf, lane, b1, b2 }));
+            }
+        }
+        self.found = found.or(self.found);
+        found.map(|hit| hit.t)
     }
 }

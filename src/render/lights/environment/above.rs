@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3, Vec3};
 use super::lat_long::LatLong;
 
 /// Leaves at most.
-const MOST_LEAVES: usize = 1 << 16;
+const MOST_LEAVES: usize = 1 << 13;
 /// Added to a radius: more than f32 loses in n·m.
 const ROUNDING: f32 = 2e-6;
 
@@ -20,7 +20,7 @@ struct Node {
     mean: Vec3,
     reach: f32,
     /// ∫ brightness dω, as a share of the picture's.
-    light: f32,
+    light: f64,
     /// Its first half; the second follows. 0 for a leaf.
     halves: u32,
 }
@@ -28,10 +28,10 @@ struct Node {
 impl Node {
     /// About the irradiance that it gives a surface with this normal, as a share.
     #[inline]
-    fn gives(&self, normal: Vec3) -> f32 {
+    fn gives(&self, normal: Vec3) -> f64 {
         let c = normal.dot(self.mean);
         let above = if c >= self.reach { c } else { (c + self.reach).max(0.0).powi(2) / (4.0 * self.reach) };
-        self.light * above
+        self.light * f64::from(above)
     }
 }
 
@@ -77,6 +77,8 @@ pub struct Drawn {
     pub columns: (usize, usize),
     /// Rows of cells.
     pub rows: (usize, usize),
+    /// Its share of the picture's light.
+    pub light: f64,
     /// With which probability.
     pub probability: f64,
     /// The numbers that it was drawn with, from 0 to 1 again, 1 included.
@@ -123,7 +125,7 @@ impl Above {
         };
         let mean = if light > 0.0 { (moment / light).as_vec3() } else { Vec3::ZERO };
         let reach = grid.farthest(mean.as_dvec3(), columns, rows) as f32 + ROUNDING;
-        self.nodes[at] = Node { mean, reach, light: light as f32, halves: halves as u32 };
+        self.nodes[at] = Node { mean, reach, light, halves: halves as u32 };
         (moment, light)
     }
 
@@ -154,7 +156,7 @@ impl Above {
             }
         }
         let (columns, rows) = self.cells(&range, grid);
-        Some(Drawn { columns, rows, probability, u: u.clamp(DVec2::ZERO, DVec2::ONE) })
+        Some(Drawn { columns, rows, light: node.light, probability, u: u.clamp(DVec2::ZERO, DVec2::ONE) })
     }
 
     /// The block in which a cell lies, and the probability with which [`Above::draw`] draws it for a surface with this normal.
@@ -171,7 +173,7 @@ impl Above {
             probability *= if in_first { p } else { 1.0 - p };
         }
         let (columns, rows) = self.cells(&range, grid);
-        Drawn { columns, rows, probability, u: DVec2::ZERO }
+        Drawn { columns, rows, light: node.light, probability, u: DVec2::ZERO }
     }
 }
 
@@ -179,7 +181,7 @@ impl Above {
 /// what is dark is never drawn.
 #[inline]
 fn share_of_first(first: &Node, second: &Node, normal: Vec3) -> f64 {
-    let (a, b) = (f64::from(first.gives(normal)), f64::from(second.gives(normal)));
-    let (a, b) = if a + b > 0.0 { (a, b) } else { (f64::from(first.light), f64::from(second.light)) };
+    let (a, b) = (first.gives(normal), second.gives(normal));
+    let (a, b) = if a + b > 0.0 { (a, b) } else { (first.light, second.light) };
     if a + b > 0.0 { a / (a + b) } else { 0.5 }
 }

@@ -87,24 +87,26 @@ impl Density {
         last
     }
 
-    /// Column, row, and the coordinates x and s of a place in a block of cells drawn with two numbers in [0, 1).
-    pub fn sample(
+    /// The cell of a block in which two numbers in [0, 1) lie, as column and row, and how far through it, to the right and down.
+    pub fn pick(
         &self,
         grid: &LatLong,
-        corners: impl Fn(usize, usize) -> Corners,
         (columns, rows): ((usize, usize), (usize, usize)),
         u: DVec2,
     ) -> (usize, usize, f64, f64) {
         let (row, s) = self.pick_row(grid, columns, rows, u.x);
-        let (column, x) = pick(self.sums(grid, columns, row), 0.0, u.y);
-        let column = column + columns.0;
-        if at_pole(grid, row) {
-            return (column, row, x, s);
-        }
-        let [a, b, c, d] = corners(column, row);
-        let s = linear(a + b, c + d, s);
-        (column, row, linear(lerp(a, c, s), lerp(b, d, s), x), s)
+        let (column, x) = pick(self.sums(grid, columns, row), u.y);
+        (column + columns.0, row, x, s)
     }
+}
+
+/// The coordinates x and s in a cell of a row, with these corners, so far through it.
+pub fn within(grid: &LatLong, row: usize, [a, b, c, d]: Corners, (x, s): (f64, f64)) -> (f64, f64) {
+    if at_pole(grid, row) {
+        return (x, s);
+    }
+    let s = linear(a + b, c + d, s);
+    (linear(lerp(a, c, s), lerp(b, d, s), x), s)
 }
 
 fn at_pole(grid: &LatLong, row: usize) -> bool {

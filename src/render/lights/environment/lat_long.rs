@@ -18,6 +18,8 @@ pub struct LatLong {
     turn: f64,
     /// sin²(θ/2) of every row; the share of the sphere above it.
     cap: Vec<f64>,
+    /// Solid angle of a cell in every row of them, sr.
+    solid_angles: Vec<f64>,
 }
 
 /// A place in a cell.
@@ -39,34 +41,50 @@ impl LatLong {
     /// The grid of a picture with `width` ≥ 1 columns and `height` ≥ 2 rows, turned by `turn` (rad) about +y: counter-clockwise
     /// seen from above.
     pub fn new(width: usize, height: usize, turn: f64) -> Self {
-        let cap = |row: usize| (FRAC_PI_2 * row as f64 / (height - 1) as f64).sin().powi(2);
-        Self { width, height, turn: turn % TAU, cap: (0..height).map(cap).collect() }
+        let half = FRAC_PI_2 / (height - 1) as f64;
+        let cap = |row: usize| (half * row as f64).sin().powi(2);
+        // 2π/W·(cosθ_a − cosθ_b), as a product that does not cancel.
+        let solid_angle = |row: usize| 2.0 * TAU / width as f64 * (half * (2 * row + 1) as f64).sin() * half.sin();
+        let (cap, solid_angles) = ((0..height).map(cap).collect(), (0..height - 1).map(solid_angle).collect());
+        Self { width, height, turn: turn % TAU, cap, solid_angles }
     }
 
-    /// Solid angle of a cell in this row, sr: 2π/W·(cosθ_a − cosθ_b), as a product that does not cancel.
+    /// Solid angle of a cell in this row, sr.
     pub fn solid_angle(&self, row: usize) -> f64 {
-        let half = FRAC_PI_2 / (self.height - 1) as f64;
-        2.0 * TAU / self.width as f64 * (half * (2 * row + 1) as f64).sin() * half.sin()
+        self.solid_angles[row]
     }
 
     /// Where a direction lies.
     pub fn place(&self, d: DVec3) -> Place {
         let (x, column) = self.across(d);
-        let flat = d.x.hypot(d.z);
-        let across = (self.height - 1) as f64 / PI;
-        let down = flat.atan2(d.y) * across;
+        let flat2 = d.x.mul_add(d.x, d.z * d.z);
+        let down = self.down(flat2, d.y);
         let row = (down as usize).min(self.height - 2);
-        let y = (down - row as f64).clamp(0.0, 1.0);
         // Measured from the nearer pole, where the share of the sphere keeps its digits.
-        let (from, angle, mirrored) = self.nearer_pole(row, flat, d.y);
+        let (from, mirrored) = self.nearer_pole(row);
         let (low, high) = (self.cap[from], self.cap[from + 1]);
-        let s = (((0.5 * angle).sin().powi(2) - low) / (high - low)).clamp(0.0, 1.0);
-        Place { column, row, x, y, s: if mirrored { 1.0 - s } else { s } }
+        let up = if mirrored { -d.y } else { d.y };
+        // sin²(θ/2) by that of the two forms that doesn't cancel.
+        let cap = if up >= 0.0 { flat2 / (2.0 + 2.0 * up) } else { 0.5 - 0.5 * up };
+        let s = ((cap - low) / (high - low)).clamp(0.0, 1.0);
+        Place { column, row, x, y: (down - row as f64).clamp(0.0, 1.0), s: if mirrored { 1.0 - s } else { s } }
+    }
+
+    /// Rows from above, of the direction with this sin²θ and cosθ.
+    fn down(&self, flat2: f64, up: f64) -> f64 {
+        flat2.sqrt().atan2(up) * ((self.height - 1) as f64 / PI)
+    }
+
+    /// The place with coordinates x and s in a cell, and its unit direction.
+    pub fn at(&self, column: usize, row: usize, x: f64, s: f64) -> (Place, DVec3) {
+        let d = self.direction(column, row, x, s);
+        let y = (self.down(d.x.mul_add(d.x, d.z * d.z), d.y) - row as f64).clamp(0.0, 1.0);
+        (Place { column, row, x, y, s }, d)
     }
 
     /// The unit direction of the point with coordinates x and s in a cell.
     pub fn direction(&self, column: usize, row: usize, x: f64, s: f64) -> DVec3 {
-        let (from, _, mirrored) = self.nearer_pole(row, 0.0, 1.0);
+        let (from, mirrored) = self.nearer_pole(row);
         let s = if mirrored { 1.0 - s } else { s };
         let cap = self.cap[from] + s * (self.cap[from + 1] - self.cap[from]);
         let flat = 2.0 * (cap * (1.0 - cap)).sqrt();
@@ -108,13 +126,9 @@ impl LatLong {
         (1.0 + p.length_squared() - 2.0 * dot).clamp(0.0, 4.0).sqrt()
     }
 
-    /// Row counted from the nearer pole, the angle from it, and whether that is the lower one.
-    fn nearer_pole(&self, row: usize, flat: f64, up: f64) -> (usize, f64, bool) {
-        if 2 * row + 1 < self.height {
-            (row, flat.atan2(up), false)
-        } else {
-            (self.height - 2 - row, flat.atan2(-up), true)
-        }
+    /// Row counted from the nearer pole, and whether that is the lower one.
+    fn nearer_pole(&self, row: usize) -> (usize, bool) {
+        if 2 * row + 1 < self.height { (row, false) } else { (self.height - 2 - row, true) }
     }
 
     fn across(&self, d: DVec3) -> (f64, usize) {
