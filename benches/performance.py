@@ -245,6 +245,23 @@ def module(path):
     return found
 
 
+class Promises:
+    """How often promises of the command line are kept."""
+
+    def command(self, options):
+        return "benches/promises.py" + (" --trials 10" if options.quick else "")
+
+    def missing(self, options):
+        return []
+
+    def build(self, options):
+        build_goniofit()
+
+    def measure(self, options):
+        words = [HERE / "promises.py", "--goniofit", GONIOFIT, *(["--trials", "10"] if options.quick else [])]
+        return output(words).strip()
+
+
 class Pictures:
     """Pictures beside Mitsuba 3."""
 
@@ -279,6 +296,7 @@ SECTIONS = {
     "zero-cost": ZeroCost(),
     "plans": Bench("render_accuracy", arguments=["--plans"]),
     "promises": Bench("render_accuracy", arguments=["--promises"], quick=["--trials", "10"]),
+    "kept": Promises(),
     "pictures": Pictures(),
 }
 

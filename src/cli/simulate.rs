@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// Relative error that means over the cones of source and aperture may have [default: 1e-6]
     #[arg(long, value_name = "E", value_parser = parse_tolerance, conflicts_with = "time_budget")]
     target_error: Option<f64>,
-    /// Time for the readings (50ms, 2s, 1m): means over cones are as good as fits into it
+    /// Time from the program's start to the last reading (50ms, 2s, 1m): means over cones are as good as fits into it
     #[arg(long, value_name = "T", value_parser = parse_time)]
     time_budget: Option<Duration>,
     /// Where to write; the extension chooses the format (.csv, .binary); `-` is CSV on stdout
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     let (mut table, raw, how) = if args.raw.is_none() && args.auto.is_none() && plan.instrument.is_plain() {
         let table = chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
-        (table, None, How::default())
+        (table, None, How { seconds: ui.start().elapsed().as_secs_f64(), ..How::default() })
     } else {
         let (raw, how) =
             chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
@@ -123,6 +123,8 @@ struct How {
     /// Largest error of a mean over cones, and what it may be.
     error: f64,
     accuracy: f64,
+    /// From the program's start to the last reading, s.
+    seconds: f64,
 }
 
 /// Reads, with the accuracy and the effects that were asked for.
@@ -135,11 +137,11 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     });
     let left_out: Vec<&str> = spared.iter().map(|s| s.effect).collect();
     let job = Job { left_out: &left_out, ..job };
-    let affordable = args.time_budget.map(|time| job.affordable(time));
+    let affordable = args.time_budget.map(|time| job.affordable(time.saturating_sub(ui.start().elapsed())));
     let accuracy = affordable.map_or(job.accuracy, |a| a.accuracy);
     let raw = Job { accuracy, ..job }.run_until(affordable.map(|a| a.deadline), ui.control());
     let error = raw.quadrature_error;
-    (raw, How { spared, affordable, error, accuracy })
+    (raw, How { spared, affordable, error, accuracy, seconds: ui.start().elapsed().as_secs_f64() })
 }
 
 impl How {
@@ -199,6 +201,7 @@ fn report(args: &Args, plan: &Plan, table: &Measurement, raw: Option<&Raw>, how:
     let object = json!({
         "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed, "instrument_hours": hours,
         "effects": effects, "left_out": how.spared, "quadrature_error": how.error, "time_budget": how.affordable,
+        "seconds_to_last_reading": how.seconds,
         "notes": table.notes,
     });
     (text, object)

@@ -36,7 +36,7 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     if source == 0.0 && detector == 0.0 && spot.is_none() {
         return Box::new(light);
     }
-    let cones = |accuracy: f64| Cones::new(source, detector, accuracy, maker.dimension);
+    let cones = |accuracy: f64| Cones::new(source, detector, accuracy, maker.dimension).kinked(maker.lobes.is_none());
     let late = maker.deadline.map(|deadline| (deadline, cones(COARSEST)));
     // Half of the error is the spot's, half that of what its points see.
     let accuracy = if spot.is_some() { 0.5 * maker.accuracy } else { maker.accuracy };
