@@ -92,8 +92,8 @@ fn bad_targets_are_refused() {
 fn a_time_budget_ends_the_work() {
     let start = Instant::now();
     let deadline = Some(start + Duration::from_secs(1));
-    let options = Options { width: 64, height: 64, samples: 1 << 24, deadline, ..Options::default() };
+    let options = Options { width: 16, height: 16, samples: 1 << 24, deadline, ..Options::default() };
     let film = render(&built("cornell"), &options, Control::silent()).expect("renders");
-    assert!(film.total_samples() > 0);
-    assert!(start.elapsed() < Duration::from_mins(1), "2^24 samples would take half a day");
+    assert!(film.samples() >= 2, "a picture of 256 pixels is whole long before");
+    assert!(start.elapsed() < Duration::from_mins(1), "2^24 samples would take half an hour");
 }

@@ -26,6 +26,7 @@ mod report;
 mod scenes;
 mod simulate;
 mod simulation;
+mod text;
 mod tradeoff;
 mod ui;
 mod validate;

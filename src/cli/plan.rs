@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::failure::Failure;
 use super::instrument::read_instrument;
 use super::output::{check_folder, keeps_inputs, stdout_is_free, write_text};
+use super::text::{COLUMNS, wrapped};
 use super::ui::{Ui, significant};
 use crate::brdf::ModelSpec;
 use crate::fit::Limit;
@@ -40,6 +41,9 @@ pub(super) struct Args {
 }
 
 /// Scans that are usual, to compare with.
+/// Columns of a parameter.
+const CELL: usize = 15;
+
 const STANDARD: [Scan; 4] = [
     Scan::InPlane { step_deg: 1.0 },
     Scan::InPlane { step_deg: 5.0 },
@@ -163,9 +167,14 @@ impl Table {
         );
         text.extend(self.longer().map(|said| said + "\n"));
         text.push('\n');
-        let heads: Vec<String> = self.names.iter().map(|n| format!("{n:>24}")).collect();
+        // A parameter's lobe stands above its name: `phong[1].exponent` is wider than its numbers.
+        let parts: Vec<(&str, &str)> = self.names.iter().map(|n| n.split_once('.').unwrap_or(("", n))).collect();
+        let heads = |part: fn(&(&str, &str)) -> String| -> String {
+            parts.iter().map(|of| format!("{:>CELL$}", part(of))).collect()
+        };
         // Writing to a String can't fail.
-        let _ = writeln!(text, "{:14}{:>9}{:>9}{:>12}{}", "scan", "stops", "hours", "efficiency", heads.join(""));
+        let _ = writeln!(text, "{:36}{}", "", heads(|of| of.0.into()));
+        let _ = writeln!(text, "{:14}{:>6}{:>8}{:>8}{}", "scan", "stops", "hours", "eff., %", heads(|of| of.1.into()));
         for (name, of, efficiency) in &self.scans {
             let _ = writeln!(text, "{}", Self::line(name, of, *efficiency));
         }
@@ -173,21 +182,20 @@ impl Table {
         for (name, of, efficiency) in &self.scans[1..] {
             let _ = writeln!(text, "{}", Self::line(name, &of.in_hours(self.scans[0].1.hours), *efficiency));
         }
-        text.push_str(
-            "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' noise and what \
-             they share: positions and the certificate. Efficiency: the share of the best information an hour by noise alone.",
-        );
+        let below = "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' noise and what they \
+             share: positions and the certificate. Efficiency: the share of the best information an hour by noise alone.";
+        text.push_str(&wrapped(below, COLUMNS).join("\n"));
         text
     }
 
     /// One scan.
     fn line(name: &str, of: &Precision, efficiency: f64) -> String {
         let percent = |e: f64| if e.is_finite() { significant(100.0 * e) } else { "open".into() };
-        let cell = |e: &[f64; 3]| format!("{:>24}", format!("{} ({})", percent(e[1]), percent(e[2])));
+        let cell = |e: &[f64; 3]| format!("{:>CELL$}", format!("{} ({})", percent(e[1]), percent(e[2])));
         let cells: Vec<String> = of.errors.iter().map(cell).collect();
         let hours = significant(of.hours);
-        let share = format!("{} %", significant(100.0 * efficiency));
-        format!("{name:14}{:>9}{hours:>9}{share:>12}{}", of.stops, cells.join(""))
+        let share = significant(100.0 * efficiency);
+        format!("{name:14}{:>6}{hours:>8}{share:>8}{}", of.stops, cells.join(""))
     }
 
     fn object(&self, out: &Path) -> Value {

@@ -123,6 +123,8 @@ struct How {
     /// Largest error of a mean over cones, and what it may be.
     error: f64,
     accuracy: f64,
+    /// Of a budget, what was left when the readings began, s.
+    left_s: f64,
     /// From the program's start to the last reading, s.
     seconds: f64,
 }
@@ -137,11 +139,13 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     });
     let left_out: Vec<&str> = spared.iter().map(|s| s.effect).collect();
     let job = Job { left_out: &left_out, ..job };
-    let affordable = args.time_budget.map(|time| job.affordable(time.saturating_sub(ui.start().elapsed())));
+    let left = args.time_budget.map_or(Duration::ZERO, |time| time.saturating_sub(ui.start().elapsed()));
+    let affordable = args.time_budget.map(|_| job.affordable(left));
     let accuracy = affordable.map_or(job.accuracy, |a| a.accuracy);
     let raw = Job { accuracy, ..job }.run_until(affordable.map(|a| a.deadline), ui.control());
     let error = raw.quadrature_error;
-    (raw, How { spared, affordable, error, accuracy, seconds: ui.start().elapsed().as_secs_f64() })
+    let (left_s, seconds) = (left.as_secs_f64(), ui.start().elapsed().as_secs_f64());
+    (raw, How { spared, affordable, error, accuracy, left_s, seconds })
 }
 
 impl How {
@@ -157,7 +161,8 @@ impl How {
         }
         if let Some(Affordable { predicted_s, .. }) = self.affordable.filter(|a| !a.fits) {
             ui.warn(&format!(
-                "even the lowest orders take {predicted_s:.2} s, more than --time-budget: all was read with them"
+                "even the lowest orders take {predicted_s:.2} s, and {:.2} s of --time-budget were left for them: all was read with them",
+                self.left_s
             ));
         }
     }

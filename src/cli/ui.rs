@@ -2,13 +2,14 @@
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::failure::Failure;
+use super::text::folded;
 use crate::control::{Control, Progress, Stop};
 
 static STOP: Stop = Stop::new();
@@ -49,8 +50,7 @@ pub(super) struct Ui {
 
 impl Ui {
     pub fn new(json: bool, quiet: bool) -> Self {
-        let shown = !quiet && std::io::stderr().is_terminal();
-        Self { json, quiet, start: Instant::now(), bar: Bar { shown, current: Mutex::new(None) } }
+        Self { json, quiet, start: Instant::now(), bar: Bar::new(quiet) }
     }
 
     /// When the command began.
@@ -92,7 +92,7 @@ impl Ui {
         if self.json {
             print_line(&json.to_string());
         } else if !text.is_empty() {
-            print_line(text.trim_end());
+            print_text(text.trim_end());
         }
     }
 }
@@ -103,9 +103,23 @@ pub(super) fn significant(x: f64) -> String {
     format!("{x:.*}", digits as usize)
 }
 
+/// The text as it fits a terminal's columns; as it is where there is none, for programs read lines.
+fn fitting(text: &str, terminal: &console::Term) -> String {
+    match terminal.size_checked() {
+        Some((_, columns)) if terminal.is_term() && columns >= 40 => folded(text, columns.into()),
+        _ => text.to_owned(),
+    }
+}
+
 /// Prints a line on stderr; a closed pipe is no error.
 fn print_aside(text: &str) {
+    let text = fitting(text, &console::Term::stderr());
     let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Prints text for people on stdout.
+fn print_text(text: &str) {
+    print_line(&fitting(text, &console::Term::stdout()));
 }
 
 /// Prints a line on stdout; a closed pipe is no error.
@@ -129,30 +143,63 @@ pub(super) fn report_failure(failure: &Failure, json: bool) -> ExitCode {
         print_line(&object.to_string());
     } else {
         if let Some(found) = &failure.found {
-            print_line(found.0.trim_end());
+            print_text(found.0.trim_end());
         }
         print_aside(&format!("error: {message}"));
     }
     ExitCode::from(failure.code)
 }
 
-/// A progress bar, on a terminal only.
+/// Progress: a bar on a terminal, a line now and then elsewhere.
 struct Bar {
-    shown: bool,
+    quiet: bool,
     current: Mutex<Option<ProgressBar>>,
+    plain: Mutex<Option<Plain>>,
+}
+
+/// Progress where there is no terminal.
+struct Plain {
+    label: String,
+    total: u64,
+    done: u64,
+    state: String,
+    start: Instant,
+    said: Instant,
+}
+
+/// Between two lines of it.
+const NOW_AND_THEN: Duration = Duration::from_secs(10);
+
+impl Plain {
+    /// What there is to say, if it is time.
+    fn due(&mut self, now: Instant) -> Option<String> {
+        if now - self.said < NOW_AND_THEN || self.done == 0 {
+            return None;
+        }
+        self.said = now;
+        let (elapsed, share) = ((now - self.start).as_secs_f64(), self.done as f64 / self.total.max(1) as f64);
+        let left = elapsed * (1.0 / share - 1.0).max(0.0);
+        let state = if self.state.is_empty() { String::new() } else { format!(", {}", self.state) };
+        Some(format!("{}: {:.0} %, {elapsed:.0} s, {left:.0} s to go{state}", self.label, 100.0 * share.min(1.0)))
+    }
 }
 
 impl Bar {
-    fn with(&self, f: impl FnOnce(&mut Option<ProgressBar>)) {
-        if self.shown {
-            f(&mut self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
-        }
+    fn new(quiet: bool) -> Self {
+        Self { quiet, current: Mutex::new(None), plain: Mutex::new(None) }
+    }
+
+    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn plain(&self) -> MutexGuard<'_, Option<Plain>> {
+        self.plain.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Prints without tearing the bar.
     fn aside(&self, print: impl FnOnce()) {
-        let bar = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        match &*bar {
+        match &*self.bar() {
             Some(bar) => bar.suspend(print),
             None => print(),
         }
@@ -161,39 +208,66 @@ impl Bar {
 
 impl Progress for Bar {
     fn start(&self, label: &str, total: u64) {
-        self.with(|current| {
-            let bar = ProgressBar::new(total).with_message(label.to_owned());
-            if let Ok(style) =
-                ProgressStyle::with_template("{msg:24} {bar:30} {percent:>3} %  {elapsed} of {duration}  {prefix}")
-            {
-                bar.set_style(style);
-            }
-            bar.enable_steady_tick(Duration::from_millis(200));
-            *current = Some(bar);
-        });
+        if self.quiet {
+            return;
+        }
+        if !std::io::stderr().is_terminal() {
+            let now = Instant::now();
+            let (label, state) = (label.to_owned(), String::new());
+            *self.plain() = Some(Plain { label, total, done: 0, state, start: now, said: now });
+            return;
+        }
+        let bar = ProgressBar::new(total).with_message(label.to_owned());
+        let template = "{msg:20} {bar:16} {percent:>3} % {elapsed:>4}, {eta} to go, {per_sec} {prefix}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        *self.bar() = Some(bar);
     }
 
     fn advance(&self, steps: u64) {
-        self.with(|current| {
-            if let Some(bar) = current {
-                bar.inc(steps);
-            }
+        if let Some(bar) = &*self.bar() {
+            bar.inc(steps);
+        }
+        let line = self.plain().as_mut().and_then(|plain| {
+            plain.done += steps;
+            plain.due(Instant::now())
         });
+        line.into_iter().for_each(|line| print_aside(&line));
     }
 
     fn tell(&self, state: &str) {
-        self.with(|current| {
-            if let Some(bar) = current {
-                bar.set_prefix(state.to_owned());
-            }
-        });
+        if let Some(bar) = &*self.bar() {
+            bar.set_prefix(state.to_owned());
+        }
+        if let Some(plain) = &mut *self.plain() {
+            state.clone_into(&mut plain.state);
+        }
     }
 
     fn finish(&self) {
-        self.with(|current| {
-            if let Some(bar) = current.take() {
-                bar.finish_and_clear();
-            }
-        });
+        if let Some(bar) = self.bar().take() {
+            bar.finish_and_clear();
+        }
+        *self.plain() = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_terminal_progress_is_a_line_now_and_then() {
+        let start = Instant::now();
+        let mut plain =
+            Plain { label: "render".into(), total: 200, done: 50, state: "error 2 %".into(), start, said: start };
+        assert_eq!(plain.due(start + Duration::from_secs(9)), None);
+        let said = plain.due(start + Duration::from_secs(10));
+        assert_eq!(said.as_deref(), Some("render: 25 %, 10 s, 30 s to go, error 2 %"));
+        assert_eq!(plain.due(start + Duration::from_secs(19)), None);
+        plain.done = 0;
+        assert_eq!(plain.due(start + Duration::from_secs(99)), None);
     }
 }

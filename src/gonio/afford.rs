@@ -13,7 +13,7 @@ const BEFORE: usize = 8;
 /// Share of the time that trials may take.
 const TRIALS: f64 = 0.2;
 /// Accuracies that are tried, each a step finer; the first takes the lowest orders that there are.
-pub(in crate::gonio) const COARSEST: f64 = 0.3;
+pub(super) const COARSEST: f64 = 0.3;
 const STEP: f64 = 0.1f64;
 const FINEST: f64 = 1e-12;
 

@@ -1,6 +1,7 @@
 //! The statistics that tests and reports use.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::function::gamma::ln_gamma;
 
 /// Quantile of the standard normal distribution, `p` in (0, 1).
 #[must_use]
@@ -32,8 +33,22 @@ pub fn chi_square_p(chi2: f64, freedom: f64) -> f64 {
 /// The value that χ² with `freedom` > 0 degrees of freedom stays below with probability `p`.
 #[must_use]
 pub fn chi_square_quantile(p: f64, freedom: f64) -> f64 {
+    let half = 0.5 * freedom;
+    // Small ones from the first terms of the series P(a, y) = yᵃe⁻ʸ/Γ(a + 1)·(1 + y/(a + 1) + …): bisection ends at 1e-9 off 0.
+    let ln_start = (p.ln() + ln_gamma(half + 1.0)) / half;
+    if ln_start < SMALL.ln() {
+        let (mut y, start) = (ln_start.exp(), ln_start);
+        for _ in 0..4 {
+            let sum = 1.0 + y / (half + 1.0) * (1.0 + y / (half + 2.0) * (1.0 + y / (half + 3.0)));
+            y = (start + (y - sum.ln()) / half).exp();
+        }
+        return 2.0 * y;
+    }
     ChiSquared::new(freedom).map_or(f64::NAN, |d| d.inverse_cdf(p))
 }
+
+/// Half a χ² that is small.
+const SMALL: f64 = 1e-3;
 
 /// Significance level of one test out of `tests` independent ones, so that all together have `level` (Šidák 1967).
 #[must_use]
@@ -69,6 +84,19 @@ pub fn chi_square_test(observed: &[f64], expected: &[f64]) -> (f64, f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// χ² of two degrees is exponential, that of one a squared normal value.
+    #[test]
+    fn small_quantiles_keep_their_digits() {
+        for p in [1e-12, 1e-6, 2e-4, 1e-3, 0.02, 0.05, 0.5] {
+            let (one, two) = (chi_square_quantile(p, 1.0), chi_square_quantile(p, 2.0));
+            let exact = -2.0 * f64::ln_1p(-p);
+            assert!((two / exact - 1.0).abs() < 1e-5, "{p}: {two} {exact}");
+            assert!(p < 1e-6 || (one / normal_quantile(0.5 + 0.5 * p).powi(2) - 1.0).abs() < 1e-5, "{p}: {one}");
+        }
+        assert!((chi_square_quantile(0.025, 3.0) - 0.215_795).abs() < 1e-5);
+        assert!((chi_square_p(chi_square_quantile(1e-4, 0.7), 0.7) - (1.0 - 1e-4)).abs() < 1e-9);
+    }
 
     #[test]
     fn quantiles_match_published_values() {

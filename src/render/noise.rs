@@ -142,7 +142,7 @@ impl Noise {
         // A pixel's channels rise and fall together, so its value is about 3V·χ² of one degree: mean square 27V², variance two thirds
         // of that. So the sum is like χ² of 2·sum²/variance degrees (Satterthwaite 1946), at most one a pixel; halved, as what the
         // picture is off by scatters about what was to be expected too.
-        let freedom = 0.5 * (3.0 * self.sum * self.sum / self.squares).min(self.pixels as f64);
+        let freedom = 0.5 * (3.0 * self.sum * self.sum / self.squares).min(self.pixels as f64).max(LEAST_FREEDOM);
         let factor = if freedom < 1000.0 {
             freedom / chi_square_quantile(doubt, freedom)
         } else {
@@ -152,13 +152,16 @@ impl Noise {
     }
 }
 
+/// Of fewer degrees of freedom nothing is concluded: a picture of a pixel or two.
+const LEAST_FREEDOM: f64 = 1.0;
+
 /// What [`PictureError::at_most`] may be wrong with, of a picture that is judged once.
 pub(super) const DOUBT_OF_ONE: f64 = 0.05;
 
 /// The same at look `k` = 1, 2, … of a picture that is done at the first look that is good enough: one that underrates the error would end the work, so
-/// that all looks share [`DOUBT_OF_ONE`], 1/(k(k + 1)) of it each.
+/// that all looks share [`DOUBT_OF_ONE`], 1/(k(k + 1)) of it each; from the sixth on, which hardly any picture comes to, as much as that.
 pub(super) fn doubt_at(look: u32) -> f64 {
-    let k = f64::from(look.max(1));
+    let k = f64::from(look.clamp(1, 6));
     DOUBT_OF_ONE / (k * (k + 1.0))
 }
 

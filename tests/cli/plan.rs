@@ -64,7 +64,7 @@ fn the_same_plan_whatever_the_threads_and_a_table_for_people() {
     }
     assert_eq!(b.bytes("1.csv"), b.bytes("2.csv"));
     let text = b.ok(&["plan", "--model", "lambert+phong+phong", "--budget", "1h", "--out", "s.csv"]).text();
-    for says in ["phong[1].exponent", "hemisphere:10", "in-plane:5", "as many hours as the plan", "efficiency"] {
+    for says in ["phong[1]", "exponent", "hemisphere:10", "in-plane:5", "as many hours as the plan", "eff., %"] {
         assert!(text.contains(says), "{says}: {text}");
     }
     for model in ["lambert", "phong"] {

@@ -11,6 +11,7 @@ use super::failure::Failure;
 use super::output::read_text;
 use super::render::{parse_size, stage_of};
 use super::simulation::{Plan, What};
+use super::text::indented;
 use super::ui::Ui;
 use crate::chain::{self, Stage};
 use crate::gonio::{ACCURACY, Change, Contribution, Contributions};
@@ -72,7 +73,7 @@ fn scene(args: &Args) -> Result<Option<Stage>, Failure> {
     if is_scene { Ok(Some(stage_of(&text, path)?)) } else { Ok(None) }
 }
 
-/// Effects that are on with their numbers, then those that are off with the reason; no wider than 100 columns.
+/// Effects that are on with their numbers, then those that are off with the reason; no wider than tables may be.
 fn table(plan: &Plan, found: &Contributions) -> String {
     let mut text = format!(
         "{} along {}, seed {}: {} readings, {:.3} s of processor time",
@@ -84,7 +85,7 @@ fn table(plan: &Plan, found: &Contributions) -> String {
     let (on, off): (Vec<&Contribution>, Vec<&Contribution>) = found.effects.iter().partition(|e| e.on);
     let _ = write!(
         text,
-        "\n\n{:18} {:>6}  {:^19}  {:^19}  because of\n{:18} {:>6}  {:>9} {:>9}  {:>9} {:>9}",
+        "\n\n{:17} {:>6} {:^16} {:^16} because of\n{:17} {:>6} {:>8} {:>7} {:>8} {:>7}",
         "without it", "time", "readings change by", "reduced, by", "", "", "largest", "rms", "largest", "rms"
     );
     for effect in &on {
@@ -95,9 +96,7 @@ fn table(plan: &Plan, found: &Contributions) -> String {
     }
     text.push_str("\n\noff:");
     for effect in off {
-        let indent = format!("\n{:19}", "");
-        let why = wrapped(&effect.why, WIDTH - 19).join(&indent);
-        let _ = write!(text, "\n{:18} {why}", effect.effect);
+        let _ = write!(text, "\n{:18} {}", effect.effect, indented(&effect.why, 19));
     }
     text
 }
@@ -116,43 +115,23 @@ fn row(text: &mut String, effect: &Contribution) {
     if effect.noise {
         why = format!("σ: {why}");
     }
-    let mut lines = wrapped(&why, WIDTH - WHY).into_iter();
     let _ = write!(
         text,
-        "\n{:18} {time:>6}  {largest:>9} {rms:>9}  {of_reduced:>9} {rms_reduced:>9}  {}",
+        "\n{:17} {time:>6} {largest:>8} {rms:>7} {of_reduced:>8} {rms_reduced:>7} {}",
         effect.effect,
-        lines.next().unwrap_or_default()
+        indented(&why, WHY)
     );
-    for line in lines {
-        let _ = write!(text, "\n{:WHY$}{line}", "");
-    }
 }
 
-/// Columns of the terminal, and where the reason begins.
-const WIDTH: usize = 100;
-const WHY: usize = 69;
-
-/// Words in lines of at most so many characters; a longer word has its own.
-fn wrapped(words: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in words.split(' ') {
-        let line = lines.last().map_or(0, |l| l.chars().count());
-        match lines.last_mut() {
-            Some(last) if line == 0 || line + 1 + word.chars().count() <= width => {
-                last.push_str(if line == 0 { "" } else { " " });
-                last.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
-}
+/// Where the reason begins.
+const WHY: usize = 59;
 
 /// A share in per cent.
 fn share(of: f64) -> String {
     match 100.0 * of {
         0.0 => "0".into(),
         p if p < 0.001 => format!("{p:.0e} %"),
-        p => format!("{p:.3} %"),
+        p if p < 10.0 => format!("{p:.3} %"),
+        p => format!("{p:.1} %"),
     }
 }

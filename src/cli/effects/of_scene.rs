@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 
 use serde_json::json;
 
-use super::{Args, share, wrapped};
+use super::{Args, share};
 use crate::chain::{SceneEffect, SceneEffects, Stage, load, render_material, scene_effects};
 use crate::cli::failure::Failure;
+use crate::cli::text::indented;
 use crate::cli::ui::Ui;
 use crate::measurement::ReadOptions;
 use crate::render::Options;
@@ -14,8 +15,7 @@ use crate::render::Options;
 /// Longer side of the pictures, pixels, and samples of a pixel, where none is asked for.
 const SIDE: u32 = 128;
 const SAMPLES: u32 = 64;
-/// Columns of the terminal, and where the reason begins.
-const WIDTH: usize = 80;
+/// Where the reason begins.
 const WHY: usize = 42;
 
 pub(super) fn run(stage: &Stage, args: &Args, ui: &Ui) -> Result<(), Failure> {
@@ -77,9 +77,4 @@ fn table(name: &str, options: &Options, found: &SceneEffects) -> String {
         share(found.full_off_by)
     );
     text
-}
-
-/// Words from this column on.
-fn indented(words: &str, column: usize) -> String {
-    wrapped(words, WIDTH - column).join(&format!("\n{:column$}", ""))
 }

@@ -11,7 +11,6 @@ use glam::DVec3;
 use crate::geometry::angles::angle_between;
 use crate::geometry::frame::Frame;
 use crate::geometry::mirror;
-use crate::gonio::afford::COARSEST;
 use crate::measurement::Dimension;
 use crate::numeric::quadrature::gauss_legendre;
 
@@ -75,11 +74,9 @@ pub(in crate::gonio) struct Cones {
     usual: usize,
     accuracy: f64,
     dimension: Dimension,
-    /// Whether what is averaged may have kinks, as a table has that is linear between its values.
-    kinked: bool,
 }
 
-/// What a doubling leaves, at most, of the move before where there are kinks: a quarter on average, but one move may be small by chance.
+/// What a doubling leaves of a move where there are kinks, on average; one move alone may be small by chance.
 const LEFT: f64 = 0.25;
 
 /// Directions that one rule of both cones may have: for any reading, and where a peak needs them.
@@ -89,8 +86,7 @@ const MOST: usize = 5_000_000;
 impl Cones {
     /// Rules for half angles `source` and `detector` (rad), for means as good as `accuracy` (relative).
     pub fn new(source: f64, detector: f64, accuracy: f64, dimension: Dimension) -> Self {
-        let mut cones =
-            Self { half: [source, detector], rules: Vec::new(), usual: 0, accuracy, dimension, kinked: false };
+        let mut cones = Self { half: [source, detector], rules: Vec::new(), usual: 0, accuracy, dimension };
         let levels = |m: usize, most: usize| {
             (0..usize::BITS as usize).take_while(|level| 1 << level <= m && cones.size(*level) <= most).count()
         };
@@ -98,11 +94,6 @@ impl Cones {
         cones.rules = (0..all).map(|_| OnceLock::new()).collect();
         cones.usual = usual;
         cones
-    }
-
-    /// The same for what may have kinks.
-    pub fn kinked(self, kinked: bool) -> Self {
-        Self { kinked, ..self }
     }
 
     /// Orders of both cones' rules at a level: as fine in angle.
@@ -125,11 +116,13 @@ impl Cones {
     }
 
     /// Writes the mean of `f`, all channels, over both cones about (wi, wo), and returns by which share it may be off: the largest relative change
-    /// that the last doubling brought; where there may be kinks, a quarter of the one before if that is more. `f` adds its values times a weight.
+    /// that the last doubling brought; where it is `kinked`, as a table is that is linear between its values, a quarter of the one before if that is more. `f`
+    /// adds its values times a weight.
     pub fn mean(
         &self,
         wi: DVec3,
         wo: DVec3,
+        kinked: bool,
         f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
         out: &mut [f64],
     ) -> f64 {
@@ -150,14 +143,13 @@ impl Cones {
             if level > first {
                 earlier = LEFT * change;
                 change = out.iter().zip(&before).map(|(new, old)| moved(*new, *old)).fold(0.0, f64::max);
-                let sure = !self.kinked || earlier <= self.accuracy || self.accuracy >= COARSEST;
-                if change.is_nan() || change <= self.accuracy && sure {
+                if change.is_nan() || change <= self.accuracy && (!kinked || earlier <= self.accuracy) {
                     break;
                 }
             }
             before.copy_from_slice(out);
         }
-        if self.kinked && earlier < f64::INFINITY {
+        if kinked && earlier < f64::INFINITY {
             change = change.max(earlier);
         }
         // A peak between the directions of the finest rule is not known at all.

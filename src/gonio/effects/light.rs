@@ -36,12 +36,14 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     if source == 0.0 && detector == 0.0 && spot.is_none() {
         return Box::new(light);
     }
-    let cones = |accuracy: f64| Cones::new(source, detector, accuracy, maker.dimension).kinked(maker.lobes.is_none());
+    let cones = |accuracy: f64| Cones::new(source, detector, accuracy, maker.dimension);
     let late = maker.deadline.map(|deadline| (deadline, cones(COARSEST)));
     // Half of the error is the spot's, half that of what its points see.
     let accuracy = if spot.is_some() { 0.5 * maker.accuracy } else { maker.accuracy };
     let lobes = Lobes::of(maker, (source, detector), accuracy);
-    Box::new(Spread { light, cones: cones(accuracy), spot, accuracy, late, lobes, stop: maker.stop })
+    // The coarsest accuracy takes the lowest orders that there are, whatever they leave.
+    let kinked = maker.lobes.is_none() && maker.accuracy < COARSEST;
+    Box::new(Spread { light, cones: cones(accuracy), kinked, spot, accuracy, late, lobes, stop: maker.stop })
 }
 
 /// A truth that is a sum of lobes, of which means over both cones are known without a sum over directions.
@@ -154,6 +156,8 @@ impl Pass for Light<'_> {
 struct Spread<'a> {
     light: Light<'a>,
     cones: Cones,
+    /// Whether the truth may have kinks that are to be looked for.
+    kinked: bool,
     spot: Option<Spot>,
     accuracy: f64,
     /// What counts for readings that would be late.
@@ -188,7 +192,8 @@ impl Spread<'_> {
             *evaluations += 1;
             self.light.add(kind, (wi, wo), gain * weight, &mut f, out);
         };
-        let mut sum = |out: &mut [f64]| how.late.unwrap_or(&self.cones).mean(wi, wo, &mut add, out);
+        let kinked = self.kinked && how.late.is_none() && kind == Kind::Sample;
+        let mut sum = |out: &mut [f64]| how.late.unwrap_or(&self.cones).mean(wi, wo, kinked, &mut add, out);
         match self.lobes.as_ref().filter(|_| kind == Kind::Sample) {
             Some(lobes) => lobes.mean((wi, wo), gain, how, out, sum),
             None => sum(out),

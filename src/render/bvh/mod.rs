@@ -1,9 +1,9 @@
 //! A bounding volume hierarchy (built by the crate `obvhs`, f32) that never loses an f64 intersection.
 //!
-//! The boxes live in coordinates scaled by a power of two so that all of them fit in [−1, 1]; rays are cut to start at that cube.
-//! The f32 traversal is then wrong by less than 32·2⁻²⁴ in space: ½ ulp for each end of a box and for the ray's start; ½ ulp a
-//! component of its direction and 2·2⁻²³ where a tiny one is replaced, times a length of at most 2√3; 3 rounded operations of
-//! the slab test. So every box grows by 2⁻¹⁹ and every distance too, and the primitives are intersected in f64.
+//! The boxes live in coordinates scaled by a power of two so that all of them fit in [−1, 1]; rays are cut to start at a cube of twice
+//! that side, whose start f64 knows well enough up to some 10⁹ sizes away. The f32 traversal is then wrong by less than 32·2⁻²⁴ in space:
+//! ½ ulp for each end of a box and for the ray's start; ½ ulp a component of its direction and 2⁻²³ where a tiny one is replaced, times a
+//! length of at most 3√3; 3 rounded operations of the slab test. So every box grows by 2⁻¹⁹ and every distance too, and the primitives are intersected in f64.
 
 mod wide;
 

@@ -55,7 +55,22 @@ impl Wide {
     /// From a binary hierarchy that is not empty.
     pub fn new(tree: &Bvh2) -> Self {
         let mut wide = Self { nodes: Vec::new(), leaves: Vec::new(), room: 0 };
-        wide.add(tree, &[&tree.nodes[0]], 1);
+        // Nodes to be made: their children before they are opened, the place that asks for their number, how many steps down they are.
+        let mut waiting = vec![(vec![&tree.nodes[0]], None, 1)];
+        while let Some((from, asks, depth)) = waiting.pop() {
+            let number = wide.nodes.len();
+            if let Some((parent, k)) = asks {
+                let parent: &mut Node = &mut wide.nodes[parent];
+                parent.children[k] = number as u32;
+            }
+            // A step down leaves seven children to come back to.
+            wide.room = wide.room.max(depth * (WIDTH - 1) + 1);
+            let children = opened(tree, from);
+            let node = wide.node(&children);
+            wide.nodes.push(node);
+            let inner = children.iter().enumerate().filter(|(_, child)| !child.is_leaf());
+            waiting.extend(inner.map(|(k, child)| (halves(tree, child).to_vec(), Some((number, k)), depth + 1)));
+        }
         wide
     }
 
@@ -64,29 +79,22 @@ impl Wide {
         &self.leaves
     }
 
-    /// Adds a node `depth` steps down whose children are these, opened as far as there is room; its number.
-    fn add(&mut self, tree: &Bvh2, from: &[&Bvh2Node], depth: usize) -> u32 {
-        let children = opened(tree, from);
-        let number = self.nodes.len();
+    /// A node with these children, of which only leaves are numbered yet.
+    fn node(&mut self, children: &[&Bvh2Node]) -> Node {
         let (none, all) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
         let mut node = Node { bounds: [[none, all]; 3], children: [LEAF; WIDTH] };
-        self.nodes.push(node.clone());
-        self.room = self.room.max(depth * WIDTH);
         for (k, child) in children.iter().enumerate() {
             let (low, high) = (child.aabb().min.to_array(), child.aabb().max.to_array());
             for axis in 0..3 {
                 node.bounds[axis][0][k] = low[axis];
                 node.bounds[axis][1][k] = high[axis];
             }
-            node.children[k] = if child.is_leaf() {
+            if child.is_leaf() {
+                node.children[k] = LEAF | self.leaves.len() as u32;
                 self.leaves.push((child.first_index, child.prim_count));
-                LEAF | (self.leaves.len() - 1) as u32
-            } else {
-                self.add(tree, &halves(tree, child), depth + 1)
-            };
+            }
         }
-        self.nodes[number] = node;
-        number as u32
+        node
     }
 
     /// Asks the leaves whose boxes the ray meets, near ones first; with `ANY` until one has something.
@@ -101,8 +109,7 @@ fn halves<'a>(tree: &'a Bvh2, node: &Bvh2Node) -> [&'a Bvh2Node; 2] {
 }
 
 /// The nodes, the largest opened again and again while there is room.
-fn opened<'a>(tree: &'a Bvh2, from: &[&'a Bvh2Node]) -> Vec<&'a Bvh2Node> {
-    let mut list = from.to_vec();
+fn opened<'a>(tree: &'a Bvh2, mut list: Vec<&'a Bvh2Node>) -> Vec<&'a Bvh2Node> {
     while list.len() < WIDTH {
         let area = |node: &Bvh2Node| node.aabb().half_area();
         let inner = list.iter().enumerate().filter(|(_, node)| !node.is_leaf());

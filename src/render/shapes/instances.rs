@@ -102,6 +102,12 @@ impl Instances {
         self.bvh.traverse::<true>(ray, &mut Hiding { of: self, ray })
     }
 
+    /// The instance of a leaf, each of which has one, with its place.
+    fn of_leaf(&self, leaf: usize) -> (usize, &(Placement, Arc<Triangles>)) {
+        let index = self.bvh.leaves()[leaf].0 as usize;
+        (index, &self.items[index])
+    }
+
     /// The surface where a ray met a triangle of an instance.
     pub fn surface(&self, instance: usize, hit: &TriangleHit) -> Surface {
         let (placement, mesh) = &self.items[instance];
@@ -114,14 +120,6 @@ impl Instances {
     }
 }
 
-impl Instances {
-    /// Those of a leaf, with their places.
-    fn of_leaf(&self, leaf: usize) -> impl Iterator<Item = (usize, &(Placement, Arc<Triangles>))> {
-        let (first, count) = self.bvh.leaves()[leaf];
-        self.items.iter().enumerate().skip(first as usize).take(count as usize)
-    }
-}
-
 /// The search for the triangle that a ray meets first.
 struct Search<'a> {
     of: &'a Instances,
@@ -130,15 +128,12 @@ struct Search<'a> {
 }
 
 impl Contents for Search<'_> {
-    fn meet(&mut self, leaf: usize, mut t_max: f64) -> Option<f64> {
-        let mut nearer = None;
-        for (index, (placement, mesh)) in self.of.of_leaf(leaf) {
-            let Some(hit) = mesh.closest(&placement.ray_inside(&Ray { t_max, ..*self.ray })) else { continue };
-            t_max = (hit.t * placement.scale).min(t_max); // rounding must not carry it past what was found before
-            self.found = Some((t_max, index, hit));
-            nearer = Some(t_max);
-        }
-        nearer
+    fn meet(&mut self, leaf: usize, t_max: f64) -> Option<f64> {
+        let (index, (placement, mesh)) = self.of.of_leaf(leaf);
+        let hit = mesh.closest(&placement.ray_inside(&Ray { t_max, ..*self.ray }))?;
+        let t = (hit.t * placement.scale).min(t_max); // rounding must not carry it past what was found before
+        self.found = Some((t, index, hit));
+        Some(t)
     }
 }
 
@@ -150,10 +145,8 @@ struct Hiding<'a> {
 
 impl Contents for Hiding<'_> {
     fn meet(&mut self, leaf: usize, t_max: f64) -> Option<f64> {
-        let hides = |(placement, mesh): &(Placement, Arc<Triangles>)| {
-            mesh.occluded(&placement.ray_inside(&Ray { t_max, ..*self.ray }))
-        };
-        self.of.of_leaf(leaf).any(|(_, item)| hides(item)).then_some(t_max)
+        let (_, (placement, mesh)) = self.of.of_leaf(leaf);
+        mesh.occluded(&placement.ray_inside(&Ray { t_max, ..*self.ray })).then_some(t_max)
     }
 }
 

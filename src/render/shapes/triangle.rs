@@ -112,11 +112,11 @@ pub struct Four {
 }
 
 impl Four {
-    /// Of so many triangles or fewer.
+    /// Of four triangles at most.
     pub fn new(triangles: &[[DVec3; 3]]) -> Self {
-        debug_assert!(triangles.len() <= SIDE_BY_SIDE);
-        let mut four = Self { corners: Default::default(), count: triangles.len().min(SIDE_BY_SIDE) };
-        for (lane, triangle) in triangles.iter().enumerate().take(SIDE_BY_SIDE) {
+        assert!(triangles.len() <= SIDE_BY_SIDE, "{} triangles in a leaf", triangles.len());
+        let mut four = Self { corners: Default::default(), count: triangles.len() };
+        for (lane, triangle) in triangles.iter().enumerate() {
             for (corner, p) in triangle.iter().enumerate() {
                 (0..3).for_each(|axis| four.corners[corner][axis][lane] = p[axis]);
             }

@@ -59,15 +59,11 @@ impl EnvironmentImage {
     pub fn find(&self, normal: DVec3, direction: DVec3) -> (DVec3, f64) {
         let place = self.grid.place(direction);
         let drawn = self.above.find(&self.grid, normal, place.column, place.row);
-        self.found(&place, &drawn)
-    }
-
-    fn found(&self, place: &Place, drawn: &Drawn) -> (DVec3, f64) {
-        self.found_between(corners(&self.grid, &self.pixels, place.column, place.row), place, drawn)
+        self.found(corners(&self.grid, &self.pixels, place.column, place.row), &place, &drawn)
     }
 
     /// Radiance and density at a place of a cell with these corners.
-    fn found_between(&self, at: [DVec3; 4], place: &Place, drawn: &Drawn) -> (DVec3, f64) {
+    fn found(&self, at: [DVec3; 4], place: &Place, drawn: &Drawn) -> (DVec3, f64) {
         // In proportion to the radiance within the block.
         let by_radiance = self.density.pdf(&self.grid, place, at.map(brightness));
         let known = by_radiance > 0.0 && drawn.light > 0.0;
@@ -83,7 +79,7 @@ impl EnvironmentImage {
         let at = corners(&self.grid, &self.pixels, column, row);
         let (x, s) = within(&self.grid, row, at.map(brightness), (x, s));
         let (place, direction) = self.grid.at(column, row, x, s);
-        let (radiance, pdf) = self.found_between(at, &place, &drawn);
+        let (radiance, pdf) = self.found(at, &place, &drawn);
         (pdf > 0.0).then_some((direction, radiance, pdf))
     }
 }

@@ -154,7 +154,7 @@ mod tests {
                 let d = uniform_sphere(DVec2::new(rng.random(), rng.random()));
                 let p = grid.place(d);
                 let back = grid.direction(p.column, p.row, p.x, p.s);
-                // The angle from a pole loses digits only where its cosine is next to 1, and is formed from the half angle there.
+                // The share of the sphere keeps its digits at either pole.
                 assert!((back - d).length() < 1e-14, "{width} x {height}: {d} came back as {back}");
             }
         }
