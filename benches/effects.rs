@@ -67,9 +67,21 @@ fn read(instrument: &Instrument, like: &Instrument, step_deg: f64, left_out: &[&
     let (directions, weights) = Scan::Hemisphere { step_deg }.directions().expect("small");
     let (truth, channels, dimension) = (&truth, &of.channels[..], Dimension::Space);
     let (directions, weights, seed, accuracy) = (&directions, &weights, 1, 1e-6);
-    let (lobes, rows) = (None, &[][..]);
-    let job =
-        Job { truth, lobes, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out };
+    let (lobes, kinked, rows) = (None, false, &[][..]);
+    let job = Job {
+        truth,
+        lobes,
+        kinked,
+        channels,
+        instrument,
+        dimension,
+        directions,
+        weights,
+        rows,
+        seed,
+        accuracy,
+        left_out,
+    };
     let clock = Instant::now();
     let readings = series(like, directions, &lit_rows(directions, rows));
     let actual = Actual::draw(instrument, &readings, seed);

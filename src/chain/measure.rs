@@ -96,12 +96,25 @@ pub fn with_job<T>(
         Source::Measured(_) => None,
     };
     with_truth(name, source, scan, |truth, channels| {
-        let (accuracy, left_out) = (ACCURACY, &[][..]);
+        let (kinked, accuracy, left_out) = (lobes.is_none(), ACCURACY, &[][..]);
         let look = |scan: &Scan, control: Control<'_>| {
             let (directions, weights) = &scan.directions()?;
             let (dimension, rows) = (scan.dimension(), scan.rows());
-            Job { truth, lobes, channels, instrument, dimension, directions, weights, rows, seed, accuracy, left_out }
-                .look(control)
+            Job {
+                truth,
+                lobes,
+                kinked,
+                channels,
+                instrument,
+                dimension,
+                directions,
+                weights,
+                rows,
+                seed,
+                accuracy,
+                left_out,
+            }
+            .look(control)
         };
         let scan = chosen(scan, source, instrument, control, look);
         let (directions, weights) = &scan.directions()?;
@@ -112,6 +125,7 @@ pub fn with_job<T>(
         Some(Ok(work(&Job {
             truth,
             lobes,
+            kinked,
             channels,
             instrument,
             dimension,

@@ -169,12 +169,11 @@ impl Table {
         text.push('\n');
         // A parameter's lobe stands above its name: `phong[1].exponent` is wider than its numbers.
         let parts: Vec<(&str, &str)> = self.names.iter().map(|n| n.split_once('.').unwrap_or(("", n))).collect();
-        let heads = |part: fn(&(&str, &str)) -> String| -> String {
-            parts.iter().map(|of| format!("{:>CELL$}", part(of))).collect()
-        };
+        let cell = |head: &str| format!("{head:>CELL$}");
+        let (lobes, names): (Vec<String>, Vec<String>) = parts.iter().map(|of| (cell(of.0), cell(of.1))).unzip();
         // Writing to a String can't fail.
-        let _ = writeln!(text, "{:36}{}", "", heads(|of| of.0.into()));
-        let _ = writeln!(text, "{:14}{:>6}{:>8}{:>8}{}", "scan", "stops", "hours", "eff., %", heads(|of| of.1.into()));
+        let _ = writeln!(text, "{:36}{}", "", lobes.concat());
+        let _ = writeln!(text, "{:14}{:>6}{:>8}{:>8}{}", "scan", "stops", "hours", "eff., %", names.concat());
         for (name, of, efficiency) in &self.scans {
             let _ = writeln!(text, "{}", Self::line(name, of, *efficiency));
         }

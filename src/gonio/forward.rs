@@ -27,6 +27,8 @@ pub struct Job<'a> {
     pub truth: &'a Truth<'a>,
     /// The same where it is a sum of lobes: means over wide cones are then known without sums over directions.
     pub lobes: Option<&'a Material>,
+    /// Whether it has kinks, as a table has that is linear between its values: means over cones must then be surer of what they leave.
+    pub kinked: bool,
     /// Names of its channels.
     pub channels: &'a [String],
     /// The instrument.
@@ -137,9 +139,9 @@ impl Job<'_> {
 
     /// What passes are made from.
     pub(super) fn maker<'b>(&'b self, actual: &'b Actual) -> Maker<'b> {
-        let Self { truth, lobes, channels, instrument, seed, accuracy, dimension, .. } = *self;
+        let Self { truth, lobes, kinked, channels, instrument, seed, accuracy, dimension, .. } = *self;
         let stop = Control::silent().stop;
-        Maker { instrument, dimension, channels, actual, truth, lobes, seed, accuracy, stop, deadline: None }
+        Maker { instrument, dimension, channels, actual, truth, lobes, kinked, seed, accuracy, stop, deadline: None }
     }
 
     /// Readings with these signals.

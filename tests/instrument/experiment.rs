@@ -82,6 +82,7 @@ impl Experiment {
         work(&Job {
             truth: &truth,
             lobes: Some(&self.material),
+            kinked: false,
             channels: &self.material.channels,
             instrument: &self.described,
             dimension: Dimension::Space,

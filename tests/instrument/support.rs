@@ -93,6 +93,7 @@ pub fn with_job<T>(
     work(&Job {
         truth: &truth,
         lobes: None,
+        kinked: false,
         channels,
         instrument,
         dimension,

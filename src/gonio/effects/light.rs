@@ -42,7 +42,7 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     let accuracy = if spot.is_some() { 0.5 * maker.accuracy } else { maker.accuracy };
     let lobes = Lobes::of(maker, (source, detector), accuracy);
     // The coarsest accuracy takes the lowest orders that there are, whatever they leave.
-    let kinked = maker.lobes.is_none() && maker.accuracy < COARSEST;
+    let kinked = maker.kinked && maker.accuracy < COARSEST;
     Box::new(Spread { light, cones: cones(accuracy), kinked, spot, accuracy, late, lobes, stop: maker.stop })
 }
 

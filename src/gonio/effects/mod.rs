@@ -87,6 +87,8 @@ pub(super) struct Maker<'a> {
     pub truth: &'a Truth<'a>,
     /// The truth where it is a sum of lobes.
     pub lobes: Option<&'a Material>,
+    /// Whether the truth has kinks.
+    pub kinked: bool,
     pub seed: u64,
     /// Relative error that quadratures may have.
     pub accuracy: f64,
