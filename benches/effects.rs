@@ -11,7 +11,6 @@ use glam::DVec3;
 use goniofit::brdf::{LobeKind, Material};
 use goniofit::control::Control;
 use goniofit::gonio::{Actual, Instrument, Job, Scan, lit_rows, series};
-use goniofit::measurement::Dimension;
 use rayon::prelude::*;
 
 /// An effect, and what brings it.
@@ -65,26 +64,10 @@ fn read(instrument: &Instrument, like: &Instrument, step_deg: f64, left_out: &[&
         true
     };
     let (directions, weights) = Scan::Hemisphere { step_deg }.directions().expect("small");
-    let (truth, channels, dimension) = (&truth, &of.channels[..], Dimension::Space);
-    let (directions, weights, seed, accuracy) = (&directions, &weights, 1, 1e-6);
-    let (lobes, kinked, rows) = (None, false, &[][..]);
-    let job = Job {
-        truth,
-        lobes,
-        kinked,
-        channels,
-        instrument,
-        dimension,
-        directions,
-        weights,
-        rows,
-        seed,
-        accuracy,
-        left_out,
-    };
+    let job = Job { seed: 1, left_out, ..Job::new(&truth, &of.channels, instrument, (&directions, &weights)) };
     let clock = Instant::now();
-    let readings = series(like, directions, &lit_rows(directions, rows));
-    let actual = Actual::draw(instrument, &readings, seed);
+    let readings = series(like, &directions, &lit_rows(&directions, job.rows));
+    let actual = Actual::draw(instrument, &readings, job.seed);
     let raw = black_box(job.read(readings, &actual, Control::silent()));
     (raw.readings.len(), clock.elapsed().as_secs_f64())
 }

@@ -8,7 +8,7 @@ use super::surrogate::Surrogate;
 use crate::brdf::{Brdf, Material};
 use crate::control::{Control, Stop};
 use crate::gonio::{
-    ACCURACY, Adaptive, Instrument, Job, Look, Raw, Reduction, Scan, Truth, adapt, lit_rows, reduce, simulate, too_many,
+    Adaptive, Instrument, Job, Look, Raw, Reduction, Scan, Truth, adapt, lit_rows, reduce, simulate, too_many,
 };
 use crate::measurement::interpolate::TableBrdf;
 use crate::measurement::{Dimension, Measurement};
@@ -96,25 +96,12 @@ pub fn with_job<T>(
         Source::Measured(_) => None,
     };
     with_truth(name, source, scan, |truth, channels| {
-        let (kinked, accuracy, left_out) = (lobes.is_none(), ACCURACY, &[][..]);
+        let kinked = lobes.is_none();
         let look = |scan: &Scan, control: Control<'_>| {
             let (directions, weights) = &scan.directions()?;
             let (dimension, rows) = (scan.dimension(), scan.rows());
-            Job {
-                truth,
-                lobes,
-                kinked,
-                channels,
-                instrument,
-                dimension,
-                directions,
-                weights,
-                rows,
-                seed,
-                accuracy,
-                left_out,
-            }
-            .look(control)
+            let along = Job::new(truth, channels, instrument, (directions, weights));
+            Job { lobes, kinked, dimension, rows, seed, ..along }.look(control)
         };
         let scan = chosen(scan, source, instrument, control, look);
         let (directions, weights) = &scan.directions()?;
@@ -122,20 +109,8 @@ pub fn with_job<T>(
         if let Err(error) = within(instrument, lit_rows(directions, rows).len()) {
             return Some(Err(error));
         }
-        Some(Ok(work(&Job {
-            truth,
-            lobes,
-            kinked,
-            channels,
-            instrument,
-            dimension,
-            directions,
-            weights,
-            rows,
-            seed,
-            accuracy,
-            left_out,
-        })))
+        let along = Job::new(truth, channels, instrument, (directions, weights));
+        Some(Ok(work(&Job { lobes, kinked, dimension, rows, seed, ..along })))
     })?
 }
 

@@ -40,10 +40,10 @@ pub(super) struct Args {
     out: PathBuf,
 }
 
-/// Scans that are usual, to compare with.
 /// Columns of a parameter.
 const CELL: usize = 15;
 
+/// Scans that are usual, to compare with.
 const STANDARD: [Scan; 4] = [
     Scan::InPlane { step_deg: 1.0 },
     Scan::InPlane { step_deg: 5.0 },
@@ -168,9 +168,9 @@ impl Table {
         text.extend(self.longer().map(|said| said + "\n"));
         text.push('\n');
         // A parameter's lobe stands above its name: `phong[1].exponent` is wider than its numbers.
-        let parts: Vec<(&str, &str)> = self.names.iter().map(|n| n.split_once('.').unwrap_or(("", n))).collect();
         let cell = |head: &str| format!("{head:>CELL$}");
-        let (lobes, names): (Vec<String>, Vec<String>) = parts.iter().map(|of| (cell(of.0), cell(of.1))).unzip();
+        let parts = self.names.iter().map(|n| n.split_once('.').unwrap_or(("", n)));
+        let (lobes, names): (Vec<String>, Vec<String>) = parts.map(|of| (cell(of.0), cell(of.1))).unzip();
         // Writing to a String can't fail.
         let _ = writeln!(text, "{:36}{}", "", lobes.concat());
         let _ = writeln!(text, "{:14}{:>6}{:>8}{:>8}{}", "scan", "stops", "hours", "eff., %", names.concat());

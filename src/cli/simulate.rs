@@ -139,12 +139,12 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     });
     let left_out: Vec<&str> = spared.iter().map(|s| s.effect).collect();
     let job = Job { left_out: &left_out, ..job };
-    let left = args.time_budget.map_or(Duration::ZERO, |time| time.saturating_sub(ui.start().elapsed()));
-    let affordable = args.time_budget.map(|_| job.affordable(left));
+    let left = args.time_budget.map(|time| time.saturating_sub(ui.start().elapsed()));
+    let affordable = left.map(|left| job.affordable(left));
     let accuracy = affordable.map_or(job.accuracy, |a| a.accuracy);
     let raw = Job { accuracy, ..job }.run_until(affordable.map(|a| a.deadline), ui.control());
     let error = raw.quadrature_error;
-    let (left_s, seconds) = (left.as_secs_f64(), ui.start().elapsed().as_secs_f64());
+    let (left_s, seconds) = (left.unwrap_or_default().as_secs_f64(), ui.start().elapsed().as_secs_f64());
     (raw, How { spared, affordable, error, accuracy, left_s, seconds })
 }
 

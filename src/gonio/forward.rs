@@ -63,6 +63,32 @@ pub fn lit_rows(directions: &Directions, rows: &[u32]) -> Vec<u32> {
     if rows.is_empty() { all() } else { rows.iter().copied().filter(is_lit).collect() }
 }
 
+impl<'a> Job<'a> {
+    /// In space, each pair once, everything on, to [`ACCURACY`]; of the truth no more is known than its values.
+    #[must_use]
+    pub fn new(
+        truth: &'a Truth<'a>,
+        channels: &'a [String],
+        instrument: &'a Instrument,
+        (directions, weights): (&'a Directions, &'a Weights),
+    ) -> Self {
+        Self {
+            truth,
+            lobes: None,
+            kinked: false,
+            channels,
+            instrument,
+            dimension: Dimension::Space,
+            directions,
+            weights,
+            rows: &[],
+            seed: 0,
+            accuracy: ACCURACY,
+            left_out: &[],
+        }
+    }
+}
+
 impl Job<'_> {
     /// Reads all pairs of directions above the horizon, with this instrument's own errors.
     #[must_use]

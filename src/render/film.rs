@@ -290,7 +290,7 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         if !over {
             let noise = if schedule.adapts() { film.noise() } else { Vec::new() };
             if schedule.adapts() {
-                state = format!("error {:.2} %", 100.0 * Noise::all(&noise).error(film.doubt).relative);
+                state = format!("error {:.2} %", 100.0 * Noise::all(&noise).relative());
             }
             more = schedule.next(&noise);
             film.doubt = schedule.doubt();

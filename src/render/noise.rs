@@ -133,9 +133,14 @@ impl Noise {
         3.0 * self.pixels as f64
     }
 
+    /// What the picture is to be expected off by, relative.
+    pub fn relative(&self) -> f64 {
+        (self.sum / self.values()).sqrt()
+    }
+
     /// The picture's error; its bound holds but for a chance of `doubt`.
     pub fn error(&self, doubt: f64) -> PictureError {
-        let relative = (self.sum / self.values()).sqrt();
+        let relative = self.relative();
         if self.sum <= 0.0 {
             return PictureError { relative, at_most: relative };
         }

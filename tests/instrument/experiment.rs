@@ -11,7 +11,7 @@ use goniofit::fit::{FitOptions, fit};
 use goniofit::geometry::angles::direction_deg;
 use goniofit::gonio::sight::Cones;
 use goniofit::gonio::{Instrument, Job, Preset, Raw, Reduction, SimulationSpec};
-use goniofit::measurement::{Dimension, Directions, Measurement, Weights};
+use goniofit::measurement::{Directions, Measurement, Weights};
 use goniofit::numeric::stats::normal_quantile;
 use rayon::prelude::*;
 
@@ -79,20 +79,8 @@ impl Experiment {
             self.material.write_value(wi, wo, out);
             true
         };
-        work(&Job {
-            truth: &truth,
-            lobes: Some(&self.material),
-            kinked: false,
-            channels: &self.material.channels,
-            instrument: &self.described,
-            dimension: Dimension::Space,
-            directions: &self.directions,
-            weights: &Weights::Uniform,
-            rows: &[],
-            seed,
-            accuracy: ACCURACY,
-            left_out: &[],
-        })
+        let along = Job::new(&truth, &self.material.channels, &self.described, (&self.directions, &Weights::Uniform));
+        work(&Job { lobes: Some(&self.material), seed, accuracy: ACCURACY, ..along })
     }
 
     /// Reduced as a user does: by the described instrument.

@@ -90,20 +90,7 @@ pub fn with_job<T>(
     let (directions, weights) = (&scan.0, &scan.1);
     let (accuracy, channels) = (1e-9, &of.channels);
     let dimension = if of.is_flat() { Dimension::Flat } else { Dimension::Space };
-    work(&Job {
-        truth: &truth,
-        lobes: None,
-        kinked: false,
-        channels,
-        instrument,
-        dimension,
-        directions,
-        weights,
-        rows: &[],
-        seed,
-        accuracy,
-        left_out,
-    })
+    work(&Job { dimension, seed, accuracy, left_out, ..Job::new(&truth, channels, instrument, (directions, weights)) })
 }
 
 /// Reduced, errors of positions by the slopes of `model`.
