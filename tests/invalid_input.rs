@@ -12,7 +12,7 @@ use goniofit::numeric::random::{Purpose, RngExt, stream};
 /// A file of `data-fixtures/invalid`, and what its error must say of place, expected and found.
 type Broken = (&'static str, [&'static str; 3]);
 
-const CSV: [Broken; 37] = [
+const CSV: [Broken; 38] = [
     ("csv-text-for-number.csv", ["line 3, column r", "expected a number", "found \"bright\""]),
     ("csv-text-for-angle.csv", ["line 2, column theta_o_deg", "expected a number", "found \"ten\""]),
     ("csv-extra-column.csv", ["line 3", "expected 5 cells", "found 6"]),
@@ -51,6 +51,10 @@ const CSV: [Broken; 37] = [
     ("csv-grid-wrong-direction.csv", ["line 3", "expected the directions of entry 0", "found wi [0, 0, 1]"]),
     ("csv-grid-rows-missing.csv", ["after line 3", "expected 1458000 rows", "found the end of the file"]),
     ("csv-negative-weight.csv", ["line 2, column weight", "expected a number ≥ 0", "found \"-1\""]),
+    (
+        "csv-unknown-mask-reason.csv",
+        ["line 3, column mask_reason", "expected saturated, unread, shadowed, unlit, or nothing", "found \"cloudy\""],
+    ),
     ("csv-raw-readings.csv", ["line 1", "raw readings", "goniofit reduce"]),
     ("csv-not-utf8.csv", ["line 3", "expected text in UTF-8", "found other bytes"]),
 ];

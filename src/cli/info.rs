@@ -8,6 +8,7 @@ use serde_json::json;
 use super::failure::Failure;
 use super::ui::Ui;
 use crate::chain::{self, Scatter};
+use crate::control::counted;
 use crate::measurement::{Format, MerlAngles, Quantity, ReadOptions, Summary, formats};
 
 #[derive(Debug, clap::Args)]
@@ -82,6 +83,9 @@ fn describe(s: &Summary, scatter: &Result<Vec<Scatter>, String>) -> String {
         let first = s.masked.first_not_finite.as_ref().map_or(String::new(), |p| format!(", the first at {p}"));
         let _ =
             writeln!(t, "  masked        {} not measured, {} not finite{first}", s.masked.marked, s.masked.not_finite);
+    }
+    for (reason, pairs) in &s.mask_reasons {
+        let _ = writeln!(t, "    {:11} {}", reason.name(), counted(*pairs as u64, "pair"));
     }
     let range = |r: Option<(f64, f64)>| r.map_or("none".into(), |(a, b)| format!("{a:.2}° to {b:.2}°"));
     let _ = writeln!(t, "  θi            {}", range(s.theta_i_deg));

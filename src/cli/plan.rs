@@ -100,6 +100,11 @@ fn parse_time(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "expected a time of more than 0, 2h or 30min say".into())
 }
 
+/// A relative error in per cent.
+fn percent(e: f64) -> String {
+    if e.is_finite() { significant(100.0 * e) } else { "open".into() }
+}
+
 /// The plan beside the usual scans.
 struct Table {
     names: Vec<String>,
@@ -181,15 +186,42 @@ impl Table {
         for (name, of, efficiency) in &self.scans[1..] {
             let _ = writeln!(text, "{}", Self::line(name, &of.in_hours(self.scans[0].1.hours), *efficiency));
         }
+        text.push_str(&self.against_hours());
         let below = "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' noise and what they \
-             share: positions and the certificate. Efficiency: the share of the best information an hour by noise alone.";
+             share: positions and the certificate; last the medians alone. Efficiency: the share of the best information an hour by noise alone.";
         text.push_str(&wrapped(below, COLUMNS).join("\n"));
         text
     }
 
+    /// Hours that precision is shown at: shares and multiples of the budget.
+    fn hours(&self) -> [f64; 5] {
+        [0.25, 0.5, 1.0, 2.0, 4.0].map(|times| times * self.budget_h)
+    }
+
+    /// Median errors of a scan in these hours; nothing where it takes longer once. A plan for fewer hours has fewer readings.
+    fn medians((scan, of): (usize, &Precision), hours: f64) -> Option<Vec<f64>> {
+        let is_read = scan == 0 || hours >= of.hours;
+        is_read.then(|| of.in_hours(hours).errors.iter().map(|e| e[1]).collect())
+    }
+
+    /// Precision against hours, parameter by parameter.
+    fn against_hours(&self) -> String {
+        let hours = self.hours();
+        let cells = |list: [String; 5]| list.map(|cell| format!("{cell:>12}")).concat();
+        let scans = self.scans.iter().enumerate().map(|(i, (name, of, _))| (name, (i, of)));
+        let medians: Vec<_> = scans.map(|(name, scan)| (name, hours.map(|h| Self::medians(scan, h)))).collect();
+        let of_parameter = |(a, parameter): (usize, &String)| {
+            let cell = |errors: &Option<Vec<f64>>| errors.as_ref().map_or("–".into(), |errors| percent(errors[a]));
+            let line = |(name, of): &(&String, [_; 5])| format!("  {name:16}{}", cells(of.each_ref().map(cell)));
+            let lines: Vec<String> = medians.iter().map(line).collect();
+            format!("{parameter}\n{}", lines.join("\n"))
+        };
+        let blocks: Vec<String> = self.names.iter().enumerate().map(of_parameter).collect();
+        format!("\n{:18}{}\n{}\n\n", "hours", cells(hours.map(significant)), blocks.join("\n"))
+    }
+
     /// One scan.
     fn line(name: &str, of: &Precision, efficiency: f64) -> String {
-        let percent = |e: f64| if e.is_finite() { significant(100.0 * e) } else { "open".into() };
         let cell = |e: &[f64; 3]| format!("{:>CELL$}", format!("{} ({})", percent(e[1]), percent(e[2])));
         let cells: Vec<String> = of.errors.iter().map(cell).collect();
         let hours = significant(of.hours);
@@ -203,8 +235,17 @@ impl Table {
             let one = |(name, e): (&String, &[f64; 3])| json!({ "parameter": name, "relative": e.map(finite) });
             self.names.iter().zip(&of.errors).map(one).collect()
         };
-        let scan = |(name, of, efficiency): &(String, Precision, f64)| json!({ "scan": name, "stops": of.stops, "readings": of.rows, "hours": of.hours, "efficiency": efficiency, "errors": errors(of) });
-        let scans: Vec<Value> = self.scans.iter().map(scan).collect();
+        let against = |scan: (usize, &Precision)| -> Vec<Value> {
+            let median = |h| Self::medians(scan, h).map(|errors| errors.into_iter().map(finite).collect::<Vec<_>>());
+            self.hours().into_iter().map(|h| json!({ "hours": h, "median": median(h) })).collect()
+        };
+        let scan = |(i, (name, of, efficiency)): (usize, &(String, Precision, f64))| {
+            json!({
+                "scan": name, "stops": of.stops, "readings": of.rows, "hours": of.hours, "efficiency": efficiency,
+                "errors": errors(of), "against_hours": against((i, of)),
+            })
+        };
+        let scans: Vec<Value> = self.scans.iter().enumerate().map(scan).collect();
         json!({
             "out": out, "pairs": self.plan.directions.len(), "budget_hours": self.budget_h, "quantiles": QUANTILES,
             "undetermined": self.plan.undetermined, "readings_a_row": self.plan.readings, "draws": self.plan.draws, "scans": scans,

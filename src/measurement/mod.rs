@@ -8,6 +8,7 @@ pub mod error;
 pub mod formats;
 pub mod interpolate;
 pub mod merl_grid;
+pub mod reason;
 pub mod summary;
 pub mod table;
 
@@ -18,5 +19,6 @@ pub use error::MeasurementError;
 pub use formats::{Format, Quantity, ReadOptions};
 pub use interpolate::{Albedo, TableBrdf, directional_albedo};
 pub use merl_grid::{MerlAngles, MerlGrid};
+pub use reason::MaskReason;
 pub use summary::Summary;
 pub use table::{Dimension, Directions, Masked, Measurement, Weights};

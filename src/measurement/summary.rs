@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::reason::{MaskReason, counts};
 use super::table::{Dimension, Directions, Masked, Measurement};
 use crate::geometry::{phi_of, theta_of};
 use crate::numeric::sum::map_blocks;
@@ -27,6 +28,8 @@ pub struct Summary {
     pub valid_share: f64,
     /// Masked values by reason.
     pub masked: Masked,
+    /// Pairs by why they have no value in a channel, where a reduction tells.
+    pub mask_reasons: BTreeMap<MaskReason, usize>,
     /// What the entries' weights stand for.
     pub weights: &'static str,
     /// Range of θi over valid entries, degrees; `None` without any.
@@ -89,6 +92,7 @@ impl Measurement {
             valid,
             valid_share: valid as f64 / self.values.len().max(1) as f64,
             masked: self.masked.clone(),
+            mask_reasons: counts(&self.reasons),
             weights: self.weights.name(),
             theta_i_deg: ranges.theta_i,
             theta_o_deg: ranges.theta_o,

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::merl_grid::MerlGrid;
+use super::reason::MaskReason;
 use crate::brdf::Brdf;
 
 /// Whether directions fill space or lie in one plane.
@@ -149,6 +150,8 @@ pub struct Measurement {
     pub weights: Weights,
     /// What is masked, and why.
     pub masked: Masked,
+    /// Of each entry, why it has no value in a channel, where the instrument's reduction tells; empty where nobody does.
+    pub reasons: Vec<Option<MaskReason>>,
     /// The format's own way to evaluate the BRDF anywhere, where it has one (RGL).
     pub evaluator: Option<std::sync::Arc<dyn Brdf>>,
     /// Scatter per incidence that the file itself states (θi in degrees, integral), where it does (Zemax `TIS`).
@@ -174,6 +177,7 @@ impl Measurement {
             row: None,
             weights: Weights::Uniform,
             masked: Masked::default(),
+            reasons: Vec::new(),
             evaluator: None,
             stated_scatter: Vec::new(),
             notes: Vec::new(),

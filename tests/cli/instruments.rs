@@ -1,6 +1,6 @@
 //! Built-in instruments, printed as files to start from, and named wherever an instrument is.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, number};
 
 const NAMES: [&str; 5] = ["ideal", "standards-lab", "commercial", "robot", "classroom"];
 
@@ -27,6 +27,34 @@ fn an_instrument_printed_to_a_file_measures_as_the_built_in_one() {
         b.ok(&["reduce", "a.csv", "--out", "r2.csv"]);
         assert_eq!(b.text("r1.csv"), b.text("r2.csv"), "{name}");
         assert_eq!(b.json(&["instruments", name])["name"], name);
+    }
+}
+
+/// The whole chain by every one: raw readings, reduced, fitted at face value and through the instrument, and both fits beside the table in pictures.
+/// Masked is what was not measured: the rim beyond 75°, the shadow, what saturates.
+#[test]
+fn every_instrument_goes_from_readings_to_pictures() {
+    let b = Bench::new();
+    for name in NAMES {
+        let scan = ["--material", "satin", "--scan", "hemisphere:15", "--raw", "raw.csv"];
+        b.ok(&[&["simulate", "--instrument", name][..], &scan, &["--out", "m.csv"]].concat());
+        b.ok(&["reduce", "raw.csv", "--out", "reduced.csv"]);
+        let sigma: &[&str] = if name == "ideal" { &[] } else { &["--use-sigma"] };
+        b.ok(&[&["fit", "reduced.csv", "--out", "plain.json"][..], sigma].concat());
+        // Points see the material as it is: a fit through them is the plain one, and that is said.
+        let through: &[&str] = if name == "ideal" { &[] } else { &["--through", name] };
+        b.ok(&[&["fit", "reduced.csv", "--out", "through.json"][..], through, sigma].concat());
+        let validate = ["validate", "reduced.csv", "plain.json", "through.json", "--scene", "sphere", "--out", "v"];
+        let said = b.json(&[&validate[..], &["--size", "32", "--samples", "16"]].concat());
+        assert_eq!(said["fits"].as_array().expect("a list").len(), 2, "{name}");
+        for fit in said["fits"].as_array().expect("a list") {
+            let image = &fit["image"];
+            let (pixels, masked) = (number(&image["pixels"]), number(&image["masked"]));
+            let off = number(&image["rmse"]);
+            println!("{name}: {pixels} pixels, {masked} masked, rmse {off}");
+            assert!(pixels + masked == 1024.0 && masked < 0.25 * pixels && off.is_finite(), "{name}: {image}");
+        }
+        assert!(b.path("v/sheet.png").exists() && b.path("v/fit-2.exr").exists(), "{name}");
     }
 }
 

@@ -11,6 +11,15 @@ fn a_plan_is_a_scan_that_keeps_its_budget_and_is_measured_as_planned() {
     let hours = number(&plan["hours"]);
     assert!(hours <= 0.1 && hours > 0.09, "{hours}");
     assert_eq!(said["scans"].as_array().expect("a list").len(), 5, "beside four usual scans");
+    // Precision against hours: a scan that takes longer can't be read in them, and more hours are never worse.
+    for (i, scan) in said["scans"].as_array().expect("a list").iter().enumerate() {
+        let series = scan["against_hours"].as_array().expect("a list");
+        assert_eq!(number(&series[2]["hours"]), 0.1);
+        let is_read = |point: &serde_json::Value| i == 0 || number(&point["hours"]) >= number(&scan["hours"]);
+        assert!(series.iter().all(|point| point["median"].is_array() == is_read(point)), "{scan}");
+        let errors: Vec<f64> = series.iter().filter_map(|p| p["median"][2].as_f64()).collect();
+        assert!(errors.windows(2).all(|e| e[1] <= e[0] * (1.0 + 1e-12)), "{errors:?}");
+    }
     let readings = b.text("scan.csv").lines().filter(|l| !l.starts_with(['#', 't'])).count();
     assert_eq!(number(&plan["readings"]), readings as f64);
     // What simulate makes of it: the plan's pairs, none lost to shadow or saturation, in the plan's hours.
@@ -64,7 +73,9 @@ fn the_same_plan_whatever_the_threads_and_a_table_for_people() {
     }
     assert_eq!(b.bytes("1.csv"), b.bytes("2.csv"));
     let text = b.ok(&["plan", "--model", "lambert+phong+phong", "--budget", "1h", "--out", "s.csv"]).text();
-    for says in ["phong[1]", "exponent", "hemisphere:10", "in-plane:5", "as many hours as the plan", "eff., %"] {
+    for says in
+        ["phong[1]", "exponent", "hemisphere:10", "in-plane:5", "as many hours as the plan", "eff., %", "hours "]
+    {
         assert!(text.contains(says), "{says}: {text}");
     }
     for model in ["lambert", "phong"] {

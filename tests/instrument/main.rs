@@ -12,6 +12,7 @@ mod coverage;
 #[allow(dead_code)] // its study prints more than tests judge
 mod experiment;
 mod flat;
+mod hard;
 mod limits;
 mod plan;
 mod planned;

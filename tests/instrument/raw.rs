@@ -5,9 +5,10 @@ use std::path::Path;
 use crate::experiment::sigma;
 use crate::support::*;
 use goniofit::control::Control;
-use goniofit::gonio::parts::{Detector, Reference};
+use goniofit::gonio::parts::{Detector, Reference, Surroundings};
 use goniofit::gonio::{Instrument, Raw};
-use goniofit::measurement::Directions;
+use goniofit::measurement::formats;
+use goniofit::measurement::{Directions, Format, MaskReason, ReadOptions};
 
 #[test]
 fn readings_come_back_from_their_file() {
@@ -96,6 +97,41 @@ fn repeats_count_whatever_the_order_of_exposures() {
     assert_eq!(blocks, cycled);
     // 100 a second of 50 at cosθo = ½, by two readings of shot noise 10.
     assert!((cycled.0 - 2.0).abs() < 1e-12 && (cycled.1 - 0.2 / f64::sqrt(2.0)).abs() < 1e-12, "{cycled:?}");
+}
+
+/// Why a pair has no value stands in its row of the file, and comes back: an empty cell alone would not tell a full well from a shadow.
+#[test]
+fn every_masked_pair_says_why() {
+    let detector = goniofit::gonio::parts::Detector { full_well: 500.0, ..Default::default() };
+    let surroundings = Surroundings { shadow_deg: 2.0, ..Default::default() };
+    let instrument = Instrument { electrons: 100.0, read_noise: 0.0, detector, surroundings, ..Instrument::default() };
+    let log = "0,0,60,0,sample,0,1,0,50\n30,0,30,180,sample,1,1,0,500\n30,0,30,180,sample,2,9,0,500\n\
+        20,0,20,0,sample,3,1,0,50\n40,0,30,0,sample,4,1,0,\n40,0,95,0,sample,5,1,0,1\n";
+    let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}{log}")).expect("valid");
+    let m = goniofit::gonio::reduce("m", &raw, &instrument, None).expect("reduced").measurement;
+    let want = [
+        None,
+        Some(MaskReason::Saturated),
+        Some(MaskReason::Shadowed),
+        Some(MaskReason::Unread),
+        Some(MaskReason::Unlit),
+    ];
+    assert_eq!(m.reasons, want);
+    assert!((0..5).all(|i| m.value(0, i).is_some() == m.reasons[i].is_none()));
+    for reason in MaskReason::ALL {
+        assert!(m.notes.contains(&format!("1 pair of directions is masked: {}", reason.said())), "{:?}", m.notes);
+    }
+    let mut file = Vec::new();
+    formats::write(&m, Format::Csv, Path::new("m.csv"), &mut file).expect("written");
+    let text = String::from_utf8(file.clone()).expect("text");
+    let cells: Vec<&str> = text.lines().filter_map(|l| l.rsplit(',').next()).filter(|l| !l.starts_with('#')).collect();
+    assert_eq!(cells, ["mask_reason", "", "saturated", "shadowed", "unread", "unlit"], "{text}");
+    let back = formats::read_bytes(Path::new("m.csv"), file, &ReadOptions::default()).expect("read");
+    assert_eq!(back.reasons, m.reasons);
+    assert_eq!(back.summary().mask_reasons.values().sum::<usize>(), 4);
+    // Where nothing is masked nobody is told why.
+    let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}0,0,60,0,sample,0,1,0,50\n")).expect("valid");
+    assert!(goniofit::gonio::reduce("m", &raw, &instrument, None).expect("reduced").measurement.reasons.is_empty());
 }
 
 /// Without a reference nothing tells how far the source's power has walked. Two readings differ by what it walked between them, and not by less because

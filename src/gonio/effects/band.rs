@@ -1,7 +1,11 @@
-//! The spectral band: a channel of one wavelength is lit and read with its neighbours, over the triangle that equal slits of a monochromator make.
+//! The spectral band: a channel of one wavelength is lit and read with its neighbours, over the triangle that equal
+//! slits of a monochromator make.
 //!
-//! Of a smooth spectrum a band of full width at half maximum B adds B²/12 times its second derivative: the triangle's variance is B²/6. Between
-//! channels the spectrum is the parabola through the nearest and its two neighbours; beyond the first and the last it is as there.
+//! Of a smooth spectrum a band of full width at half maximum B adds B²/12 times its second derivative: the triangle's
+//! variance is B²/6. Between channels the spectrum is the parabola through the nearest and its two neighbours; beyond
+//! the first and the last it is as there. B is `source.bandwidth_nm`, nm; CIE 214 treats the effect.
+//!
+//! Realistic: 1 to 20 nm (typical). The BSDF bench of KU Leuven states 3.5 nm, NIST's STARR 14 nm.
 
 use super::{Block, Entry, Maker, Pass, stated};
 use crate::numeric::quadrature::integrate;

@@ -1,8 +1,13 @@
 //! The footprint: the share of the beam that falls on the sample and is seen by the detector.
 //!
-//! In the sample's plane the beam is an ellipse of semi-axes b/cosθi (towards wi) and b, the sample a disc, the field of view an ellipse like the beam's
-//! with θo. The share is cosθi/(πb²) times the area that all three have in common: 1 while the beam is inside the others, ∝ cosθi where it
-//! overfills the sample, ∝ cosθi/cosθo where it overfills the field. All are centred, so the common part is closed ([`crate::gonio::spot::outline`]).
+//! In the sample's plane the beam is an ellipse of semi-axes b/cosθi (towards wi) and b, the sample a disc, the field
+//! of view an ellipse like the beam's with θo. The share is cosθi/(πb²) times the area that all three have in common: 1
+//! while the beam is inside the others, ∝ cosθi where it overfills the sample, ∝ cosθi/cosθo where it overfills the
+//! field. All are centred, so the common part is closed ([`crate::gonio::spot::outline`]).
+//!
+//! Diameters in m: `source.beam_diameter_m` (2b), `sample.diameter_m`, `detector.field_diameter_m`. Realistic: beams of
+//! 1 to 40 mm (17 mm: the sampling aperture of NIST's STARR), samples of 20 to 300 mm (STARR: 50 to 300 mm), fields of
+//! 5 to 100 mm (typical). A beam of 17 mm leaves a sample of 50 mm from θi = 70° on.
 
 use std::f64::consts::PI;
 

@@ -1,7 +1,13 @@
-//! Height: the surface stands h above the axes' crossing, so source and detector see the spot from nearer and from another side.
+//! Height: the surface stands h above the axes' crossing, so source and detector see the spot from nearer and from
+//! another side.
 //!
-//! A detector at r in the direction w sees the spot at h·z along w·r − h·z. With a source at a finite distance the same holds of it, and irradiance
-//! goes as 1/r². Where the beam falls on the sample beside the detector's axis is not followed.
+//! A detector at r in the direction w sees the spot at h·z along w·r − h·z: to first order it takes in 2(h/r)cosθ more,
+//! and θ is larger by (h/r)sinθ. With a source at a finite distance the same holds of it, and irradiance goes as 1/r².
+//! Where the beam falls on the sample beside the detector's axis is not followed. h is one draw of σ =
+//! `sample.height_u_m`, m; r is `detector.distance_m` and `source.distance_m`, m.
+//!
+//! Realistic: σ from 1e-5 (gauge or autocollimator) to 1e-3 (by eye), typical. PTB found 0.04 mm over a turn of the
+//! sample, 0.01 % of the signal (proceedings of a conference at PMOD/WRC, p. 196, yumpu.com document 25400364).
 
 use glam::DVec3;
 

@@ -1,4 +1,10 @@
-//! Electronic offset: what the electronics add to every reading, however short its exposure. Dark and blank of the same exposure have it too.
+//! Electronic offset: what the electronics add to every reading, however short its exposure. Dark and blank of the same
+//! exposure have it too.
+//!
+//! signal → signal + `detector.offset`, electrons; it takes part of the full well and has no shot noise.
+//!
+//! Realistic: 0 to a few per cent of the full well (typical: converters are set so that noise about 0 is not cut off).
+//! The converter of an ATmega328PB alone is accurate to 2 of 1023 steps, 0.2 %.
 
 use super::{Block, Entry, Maker, Pass, stated};
 

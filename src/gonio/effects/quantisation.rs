@@ -1,6 +1,11 @@
 //! Quantisation: the converter rounds to steps of full_well/(2^bits − 1), and reads no more than its last.
 //!
-//! The rounding of a signal with noise of more than half a step is even and independent: it adds a variance of step²/12.
+//! The rounding of a signal with noise of more than half a step is even and independent: it adds a variance of step²/12
+//! (JCGM 100:2008, F.2.2.1). Parameters: `detector.bits` and `detector.full_well` (electrons).
+//!
+//! Realistic: 10 to 24 bits. 10: a microcontroller (ATmega328PB); 16: usual in spectrometers (Ocean Optics' Flame
+//! manual); 18 in 8 ranges: the goniometer RiGO 801; 20: a voltmeter of six digits; 24: delta-sigma converters
+//! (nominal).
 
 use super::{Block, Entry, Maker, Pass};
 use crate::gonio::parts::Detector;

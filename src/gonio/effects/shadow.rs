@@ -1,4 +1,10 @@
 //! The retro zone: where source and detector stand in each other's way no light gets from one to the other.
+//!
+//! A reading of the sample is 0 of its light where the angle between wi and wo is below `surroundings.shadow_deg`,
+//! degrees.
+//!
+//! Realistic: 0° (a beam splitter) to 15°, typical: half of the detector's head and half of the beam over the distance;
+//! 4 cm before a beam of 17 mm at 0.6 m make 2.7°. No published figure was found.
 
 use glam::DVec3;
 

@@ -35,6 +35,7 @@ use super::reading::Kind;
 use super::simulate::Truth;
 use super::spot::Spot;
 use crate::control::counted;
+use crate::measurement::reason::{self, MaskReason};
 use crate::measurement::{Dimension, Masked, Measurement};
 
 /// Why raw readings can't be reduced.
@@ -184,14 +185,6 @@ struct Work<'a> {
     visits: Visits,
 }
 
-/// Why a pair has no value, in one of its channels at least.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Left {
-    Saturated,
-    Shadowed,
-    Unlit,
-}
-
 impl Work<'_> {
     fn run(self, name: &str, stops: &[Stop], model: Option<&Truth<'_>>) -> Reduction {
         let (n, width) = (self.raw.directions.len(), self.raw.channels.len());
@@ -218,7 +211,7 @@ impl Work<'_> {
         let budget = shared.budget(&table);
         let row = shared.row(&table, width).filter(|_| self.noise.is_known());
         shared.own_into(&mut table);
-        let mut notes = Left::notes(&left);
+        let mut notes = notes_of(&left);
         if model.is_none() && positions::matter(self.instrument) {
             notes.push(
                 "errors of positions are not in σ: there was no model of the material to tell their effect".into(),
@@ -231,12 +224,26 @@ impl Work<'_> {
             dimension: self.raw.dimension,
             weights: self.raw.weights.clone(),
             masked: Masked { marked, ..Masked::default() },
+            reasons: self.reasons(&left, &table),
             sigma: self.noise.is_known().then(|| table.sigma()),
             common: shared.planes(),
             row,
             ..Measurement::new(name, self.raw.directions.clone(), self.raw.channels.clone(), table.values)
         };
         Reduction { measurement, budget, unstated: self.noise.unstated() }
+    }
+
+    /// Why each pair has no value, those among them that nobody stopped at; empty where each has one.
+    fn reasons(&self, left: &[Option<MaskReason>], table: &Table) -> Vec<Option<MaskReason>> {
+        let n = left.len();
+        let unread = |i: usize| table.values.iter().skip(i).step_by(n).all(|v| v.is_nan());
+        let of = |(i, reason): (usize, &Option<MaskReason>)| {
+            let (wi, wo) = self.raw.directions.pair(i);
+            let dark = wi.z <= 0.0 || wo.z <= 0.0;
+            reason.or_else(|| unread(i).then_some(if dark { MaskReason::Unlit } else { MaskReason::Unread }))
+        };
+        let all: Vec<Option<MaskReason>> = left.iter().enumerate().map(of).collect();
+        if all.iter().all(Option::is_none) { Vec::new() } else { all }
     }
 
     /// Reduces one stop at a pair of directions.
@@ -247,7 +254,7 @@ impl Work<'_> {
         times: &[u32],
         table: &mut Table,
         shared: &mut Shared<'_>,
-        left: &mut [Option<Left>],
+        left: &mut [Option<MaskReason>],
     ) {
         let (wi, wo) = self.raw.directions.pair(entry);
         let factor = self.scale.of(wi, wo);
@@ -255,16 +262,17 @@ impl Work<'_> {
         for (c, rate) in stop.rates.iter().enumerate() {
             let place = c * n + entry;
             if may_be_shadowed(wi, wo, self.instrument) {
-                left[entry] = Some(Left::Shadowed);
+                left[entry] = Some(MaskReason::Shadowed);
                 continue;
             }
             if !factor.is_finite() || wi.z <= 0.0 || wo.z <= 0.0 {
-                left[entry] = Some(Left::Unlit);
+                left[entry] = Some(MaskReason::Unlit);
                 continue;
             }
             let &Some(rate) = rate else {
                 if times[place] == 0 {
-                    left[entry] = Some(Left::Saturated);
+                    let reason = if stop.saturated[c] { MaskReason::Saturated } else { MaskReason::Unread };
+                    left[entry] = left[entry].min(Some(reason)).or(Some(reason));
                 }
                 continue;
             };
@@ -303,24 +311,11 @@ struct Reduced {
     time_s: f64,
 }
 
-impl Left {
-    fn notes(all: &[Option<Self>]) -> Vec<String> {
-        let pairs = |left: Self, why: &str| match all.iter().filter(|l| **l == Some(left)).count() {
-            0 => None,
-            1 => Some(format!("1 pair of directions is masked: {why}")),
-            count => Some(format!("{count} pairs of directions are masked: {why}")),
-        };
-        let list = [
-            pairs(
-                Self::Saturated,
-                "even the shortest exposure saturated, or nothing was read, in one channel at least",
-            ),
-            pairs(Self::Shadowed, "source and detector shadow each other there, or may"),
-            pairs(
-                Self::Unlit,
-                "below the horizon, or no light of the beam counts there, or the spot reaches up to source or detector",
-            ),
-        ];
-        list.into_iter().flatten().collect()
-    }
+/// What to tell of the pairs that are masked.
+fn notes_of(reasons: &[Option<MaskReason>]) -> Vec<String> {
+    let note = |(reason, count): (MaskReason, usize)| match count {
+        1 => format!("1 pair of directions is masked: {}", reason.said()),
+        _ => format!("{count} pairs of directions are masked: {}", reason.said()),
+    };
+    reason::counts(reasons).into_iter().map(note).collect()
 }

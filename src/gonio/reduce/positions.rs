@@ -92,6 +92,11 @@ impl<'a> Optics<'a> {
         Self { instrument, dimension, footprint, spot }
     }
 
+    /// Those of a spot seen from its middle: enough to plan with, where what the spot does to a cosine is far below what errors do.
+    fn of_middle(instrument: &'a Instrument) -> Self {
+        Self { spot: None, ..Self::new(instrument, Dimension::Space) }
+    }
+
     /// cosθo, over the spot, times the share of the beam.
     fn light(&self, (wi, wo): (DVec3, DVec3)) -> f64 {
         let cosine = self.spot.as_ref().map_or(wo.z, |spot| spot.cosine((wi, wo)));
@@ -193,8 +198,7 @@ pub(in crate::gonio) struct Jitter<'a> {
 
 impl<'a> Jitter<'a> {
     pub fn of(instrument: &'a Instrument) -> Self {
-        let dimension = Dimension::Space;
-        Self { optics: Optics::new(instrument, dimension), errors: jitter(instrument, dimension) }
+        Self { optics: Optics::of_middle(instrument), errors: jitter(instrument, Dimension::Space) }
     }
 
     /// Variance of what is read of `model` at a pair of directions, 1/sr².
@@ -225,7 +229,7 @@ impl<'a> Kept<'a> {
     pub fn of(instrument: &'a Instrument) -> Self {
         let mut errors = errors(instrument, Dimension::Space);
         errors.retain(|(family, _, _)| *family != JITTER);
-        let optics = Optics::new(instrument, Dimension::Space);
+        let optics = Optics::of_middle(instrument);
         let reference = optics.of_reference(&errors);
         Self { optics, errors, reference }
     }

@@ -35,8 +35,10 @@ pub(super) struct Stop {
     pub number: u32,
     /// The middle of its readings.
     pub time_s: f64,
-    /// Channel by channel; `None` where every exposure saturated.
+    /// Channel by channel; `None` where every exposure saturated, or nothing was read.
     pub rates: Vec<Option<Rate>>,
+    /// Whether a reading of it saturated, channel by channel.
+    pub saturated: Vec<bool>,
 }
 
 /// Repeats of one exposure at a stop.
@@ -61,6 +63,8 @@ pub(super) struct Summary {
     pub time_s: f64,
     /// Channel by channel: the longest exposure that does not saturate.
     pub repeats: Vec<Option<Repeats>>,
+    /// Whether a reading of it saturated, channel by channel.
+    saturated: Vec<bool>,
 }
 
 impl Summary {
@@ -68,7 +72,8 @@ impl Summary {
     pub fn stop(&self, noise: &Noise, instrument: &Instrument) -> Stop {
         let of = |(c, repeats): (usize, &Option<Repeats>)| repeats.map(|r| r.rate(noise.variance(c, &r, instrument)));
         let rates = self.repeats.iter().enumerate().map(of).collect();
-        Stop { kind: self.kind, entry: self.entry, number: self.number, time_s: self.time_s, rates }
+        let saturated = self.saturated.clone();
+        Stop { kind: self.kind, entry: self.entry, number: self.number, time_s: self.time_s, rates, saturated }
     }
 }
 
@@ -112,6 +117,7 @@ fn combined(raw: &Raw, instrument: &Instrument, (first, run): (usize, &[Reading]
             usable.then(|| Repeats::of(&signals, *exposure))
         })
     };
+    let saturated = |c: usize| (first..first + run.len()).any(|reading| raw.signals(reading)[c] >= limit);
     let end = run[run.len() - 1];
     let end_s = end.time_s + end.exposure_s;
     Summary {
@@ -120,6 +126,7 @@ fn combined(raw: &Raw, instrument: &Instrument, (first, run): (usize, &[Reading]
         number: run[0].stop,
         time_s: 0.5 * (run[0].time_s + end_s),
         repeats: (0..raw.channels.len()).map(channel).collect(),
+        saturated: (0..raw.channels.len()).map(saturated).collect(),
     }
 }
 

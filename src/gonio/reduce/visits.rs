@@ -310,7 +310,14 @@ mod tests {
 
     fn stop(kind: Kind, time_s: f64, mean: f64) -> Stop {
         let rate = Rate { mean, variance: 1.0, signal: mean, exposure_s: 1.0 };
-        Stop { kind, entry: None, number: time_s as u32, time_s, rates: vec![(!mean.is_nan()).then_some(rate)] }
+        Stop {
+            kind,
+            entry: None,
+            number: time_s as u32,
+            time_s,
+            rates: vec![(!mean.is_nan()).then_some(rate)],
+            saturated: vec![false],
+        }
     }
 
     fn visits(list: &[(Kind, f64, f64)]) -> Result<Visits, ReduceError> {

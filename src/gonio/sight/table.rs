@@ -1,4 +1,4 @@
-//! Functions of one angle, interpolated: pieces as wide as the lobe's own scale, a Chebyshev polynomial on each.
+//! Functions of one angle, interpolated: pieces as wide as the lobe's own scale, on each the polynomial through its Chebyshev nodes.
 
 use std::f64::consts::PI;
 use std::sync::LazyLock;
@@ -15,7 +15,8 @@ pub(super) struct Table<const F: usize> {
     first: Vec<u32>,
     /// Steps over rad.
     per_rad: f64,
-    /// Chebyshev coefficients of each piece.
+    /// Coefficients of each piece by powers of its own coordinate, −1 to 1. Those of a smooth function fall so fast by Chebyshev polynomials that their
+    /// powers lose no digit that counts.
     pieces: Vec<[[f64; F]; NODES]>,
 }
 
@@ -49,7 +50,7 @@ impl<const F: usize> Table<F> {
             k += 1;
         }
         let (from, to) = (self.ends[k], self.ends[k + 1]);
-        clenshaw(&self.pieces[k], (2.0 * alpha - from - to) / (to - from))
+        polynomial(&self.pieces[k], (2.0 * alpha - from - to) / (to - from))
     }
 }
 
@@ -74,22 +75,32 @@ pub(super) fn weights(from: f64, to: f64, at: f64) -> [f64; NODES] {
     })
 }
 
+/// Coefficients by powers of the Chebyshev polynomials: T₀ = 1, T₁ = x, Tⱼ₊₁ = 2x Tⱼ − Tⱼ₋₁.
+static POWERS: LazyLock<[[f64; NODES]; NODES]> = LazyLock::new(|| {
+    let mut all = [[0.0; NODES]; NODES];
+    (all[0][0], all[1][1]) = (1.0, 1.0);
+    for j in 2..NODES {
+        all[j] = std::array::from_fn(|k| if k == 0 { 0.0 } else { 2.0 * all[j - 1][k - 1] } - all[j - 2][k]);
+    }
+    all
+});
+
 fn coefficients<const F: usize>(from: f64, to: f64, f: impl Fn(f64) -> [f64; F]) -> [[f64; F]; NODES] {
     let values = nodes(from, to).map(f);
-    std::array::from_fn(|j| {
+    let by_polynomials: [[f64; F]; NODES] = std::array::from_fn(|j| {
         let scale = if j == 0 { 1.0 } else { 2.0 } / NODES as f64;
         std::array::from_fn(|i| scale * values.iter().zip(&COSINES[j]).map(|(v, cos)| v[i] * cos).sum::<f64>())
-    })
+    });
+    std::array::from_fn(|k| std::array::from_fn(|i| (k..NODES).map(|j| by_polynomials[j][i] * POWERS[j][k]).sum()))
 }
 
-fn clenshaw<const F: usize>(piece: &[[f64; F]; NODES], x: f64) -> [f64; F] {
-    let (mut next, mut after) = ([0.0; F], [0.0; F]);
-    for c in piece[1..].iter().rev() {
-        for i in 0..F {
-            (next[i], after[i]) = (c[i] + 2.0 * x * next[i] - after[i], next[i]);
-        }
-    }
-    std::array::from_fn(|i| piece[0][i] + x * next[i] - after[i])
+/// The polynomial at x, in pairs of powers and pairs of pairs (Estrin), which wait for each other less than one sum after the other.
+fn polynomial<const F: usize>(c: &[[f64; F]; NODES], x: f64) -> [f64; F] {
+    let (x2, x4) = (x * x, (x * x) * (x * x));
+    std::array::from_fn(|i| {
+        let four = |k: usize| (c[k][i] + x * c[k + 1][i]) + x2 * (c[k + 2][i] + x * c[k + 3][i]);
+        four(0) + x4 * (four(4) + x4 * four(8))
+    })
 }
 
 #[cfg(test)]

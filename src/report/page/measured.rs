@@ -109,6 +109,9 @@ fn facts(run: &Run) -> Vec<Fact> {
             }
         },
     );
+    for (reason, pairs) in &s.mask_reasons {
+        fact("Masked pairs", format!("{}: {}", count(*pairs as u64), reason.said()));
+    }
     let range = |r: Option<(f64, f64)>| r.map_or("–".into(), |(a, b)| format!("{}° to {}°", number(a), number(b)));
     fact("θi", range(s.theta_i_deg));
     fact("θo", range(s.theta_o_deg));

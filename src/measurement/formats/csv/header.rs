@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::Needs;
-use super::{ANGLES, FLAT_ANGLES, GRIDS, SOLID_ANGLE, is_reserved};
+use super::{ANGLES, FLAT_ANGLES, GRIDS, MASK_REASON, SOLID_ANGLE, is_reserved};
 use crate::measurement::formats::Quantity;
 use crate::measurement::formats::text::{Line, Lines, quoted};
 use crate::measurement::{Dimension, MeasurementError, MerlAngles, STOPPED};
@@ -34,6 +34,7 @@ pub(super) struct Columns {
     /// Empty, or one for each channel.
     pub(super) row: Vec<usize>,
     pub(super) weight: Option<usize>,
+    pub(super) reason: Option<usize>,
 }
 
 /// Reads the `#` lines and the header, which must hold what `needs` says.
@@ -119,8 +120,8 @@ impl Columns {
             let expected = "sigma_… beside row_…, which is the part of it that the channels of a row share";
             return Err(line.invalid("header", expected, quoted(&names[first])));
         }
-        let weight = find("weight");
-        Ok(Self { names, angles, channels, sigma, common, row, weight })
+        let (weight, reason) = (find("weight"), find(MASK_REASON));
+        Ok(Self { names, angles, channels, sigma, common, row, weight, reason })
     }
 
     /// Names of the channels.

@@ -10,7 +10,7 @@ use crate::measurement::formats::rows::{Divisor, Rows, concat};
 use crate::measurement::formats::source::Source;
 use crate::measurement::formats::text::{Line, Lines, quoted};
 use crate::measurement::formats::{Quantity, ReadOptions};
-use crate::measurement::{Dimension, Directions, Measurement, MeasurementError, MerlGrid, Weights};
+use crate::measurement::{Dimension, Directions, MaskReason, Measurement, MeasurementError, MerlGrid, Weights};
 
 /// How far (rad) a row's directions may be from the MERL grid's: wider than any rounding, narrower than any bin.
 const GRID_TOLERANCE: f64 = 1e-7;
@@ -82,6 +82,7 @@ struct Table<'a> {
     common: Vec<Vec<Vec<f64>>>,
     row: Vec<Vec<f64>>,
     weight: Vec<f64>,
+    reasons: Vec<Option<MaskReason>>,
 }
 
 impl<'a> Table<'a> {
@@ -97,6 +98,7 @@ impl<'a> Table<'a> {
             common: vec![vec![Vec::new(); channels]; columns.common.len()],
             row: vec![Vec::new(); columns.row.len()],
             weight: Vec::new(),
+            reasons: Vec::new(),
         }
     }
 
@@ -118,6 +120,9 @@ impl<'a> Table<'a> {
         }
         if let Some(column) = columns.weight {
             self.weight.push(not_negative(line, &columns.label(column), cell(column))?);
+        }
+        if let Some(column) = columns.reason {
+            self.reasons.push(reason(line, &columns.label(column), cell(column))?);
         }
         self.read += 1;
         Ok(())
@@ -227,6 +232,7 @@ impl<'a> Table<'a> {
             (None, Some(_)) => Weights::Merl,
             (None, None) => Weights::Uniform,
         };
+        measurement.reasons = self.reasons;
         measurement.notes.extend(self.comments.notes.iter().cloned());
         measurement
     }
@@ -256,6 +262,15 @@ fn part_of(line: Line<'_>, column: &str, text: &str, sigma: f64) -> Result<f64, 
         return Ok(value);
     }
     Err(line.invalid(column, format!("a part of sigma_…, so {sigma} at most, of either sign"), quoted(text)))
+}
+
+/// Why a row has no value, where anybody says.
+fn reason(line: Line<'_>, column: &str, text: &str) -> Result<Option<MaskReason>, MeasurementError> {
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let expected = || format!("{}, or nothing", MaskReason::ALL.map(MaskReason::name).join(", "));
+    MaskReason::find(text).map(Some).ok_or_else(|| line.invalid(column, expected(), quoted(text)))
 }
 
 /// A finite number ≥ 0.

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{ANGLES, FLAT_ANGLES, GRIDS, SOLID_ANGLE, is_reserved};
+use super::{ANGLES, FLAT_ANGLES, GRIDS, MASK_REASON, SOLID_ANGLE, is_reserved};
 use crate::geometry::angles::{direction_deg, phi_of, sin_cos_deg, theta_of};
-use crate::measurement::{Dimension, Directions, Measurement, MeasurementError, STOPPED, Weights};
+use crate::measurement::{Dimension, Directions, MaskReason, Measurement, MeasurementError, STOPPED, Weights};
 use crate::numeric::sum::map_blocks;
 
 /// Rows formatted at once, in parallel blocks, before they are written.
@@ -84,6 +84,9 @@ fn column_names(measurement: &Measurement) -> Vec<String> {
     if has_weight_column(measurement) {
         names.push("weight".into());
     }
+    if !measurement.reasons.is_empty() {
+        names.push(MASK_REASON.into());
+    }
     names
 }
 
@@ -113,6 +116,10 @@ fn write_row(measurement: &Measurement, i: usize, text: &mut String) {
     }
     if has_weight_column(measurement) {
         push_number(text, measurement.weights.get(i));
+    }
+    if !measurement.reasons.is_empty() {
+        text.push_str(measurement.reasons.get(i).copied().flatten().map_or("", MaskReason::name));
+        text.push(',');
     }
     text.pop();
     text.push('\n');
