@@ -62,6 +62,8 @@ pub struct Demo {
     pub truth: Material,
     /// Its name.
     pub name: &'static str,
+    /// The built-in scene of its pictures.
+    pub scene: &'static str,
     /// Direction pairs measured.
     pub pairs: usize,
     /// What measured them.
@@ -191,6 +193,7 @@ pub fn demo(folder: &Path, options: &DemoOptions, control: Control<'_>) -> Resul
     let demo = Demo {
         truth,
         name: MATERIAL,
+        scene: SCENE,
         pairs: table.len(),
         instrument: name,
         fits,

@@ -8,6 +8,7 @@ mod compare;
 mod comparison;
 mod completions;
 mod convert;
+mod costs;
 mod demo;
 mod effects;
 mod failure;

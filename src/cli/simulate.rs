@@ -125,9 +125,14 @@ struct How {
     accuracy: f64,
     /// Of a budget, what was left when the readings began, s.
     left_s: f64,
+    /// The budget, s.
+    budget_s: Option<f64>,
     /// From the program's start to the last reading, s.
     seconds: f64,
 }
+
+/// A budget that is exceeded by more than this share and these seconds is said.
+const LATE: (f64, f64) = (1.1, 0.05);
 
 /// Reads, with the accuracy and the effects that were asked for.
 fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
@@ -145,7 +150,8 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     let raw = Job { accuracy, ..job }.run_until(affordable.map(|a| a.deadline), ui.control());
     let error = raw.quadrature_error;
     let (left_s, seconds) = (left.unwrap_or_default().as_secs_f64(), ui.start().elapsed().as_secs_f64());
-    (raw, How { spared, affordable, error, accuracy, left_s, seconds })
+    let budget_s = args.time_budget.map(|time| time.as_secs_f64());
+    (raw, How { spared, affordable, error, accuracy, left_s, budget_s, seconds })
 }
 
 impl How {
@@ -163,6 +169,11 @@ impl How {
             ui.warn(&format!(
                 "even the lowest orders take {predicted_s:.2} s, and {:.2} s of --time-budget were left for them: all was read with them",
                 self.left_s
+            ));
+        } else if let Some(budget) = self.budget_s.filter(|budget| self.seconds > budget * LATE.0 + LATE.1) {
+            ui.warn(&format!(
+                "the readings ended at {:.2} s, later than the {budget} s of --time-budget",
+                self.seconds
             ));
         }
     }

@@ -3,9 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::effects;
-use super::forward::Job;
+use super::forward::{BLOCK, Job};
 use crate::control::Control;
-use crate::numeric::sum::BLOCK;
 
 /// Readings that are tried, and those before that make what all readings share: tables of lobes through cones.
 const TRIED: usize = 256;
@@ -34,19 +33,31 @@ pub struct Affordable {
     pub deadline: Deadline,
 }
 
-/// When all readings have to be made, and how long one takes with the lowest orders.
+/// When all readings have to be made, and how long one takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deadline {
+    begun: Instant,
     end: Instant,
-    each_s: f64,
+    /// Predicted seconds of a reading of one thread, with the accuracy that was chosen and with the lowest orders.
+    chosen_s: f64,
+    lowest_s: f64,
     readings: usize,
 }
 
+/// Readings of one thread from which on their time tells how far the prediction is off.
+const TOLD: f64 = 32.0;
+
 impl Deadline {
-    /// Whether those from number `next` on are late unless they take the lowest orders.
+    /// Whether those from number `next` on are late unless they take the lowest orders. Trials that underrate a reading do so of all orders: what was
+    /// made so far says by how much.
     pub(super) fn presses(&self, next: usize) -> bool {
-        let left = self.each_s * self.readings.saturating_sub(next) as f64;
-        self.end.saturating_duration_since(Instant::now()).as_secs_f64() <= left
+        let now = Instant::now();
+        let threads = rayon::current_num_threads().max(1);
+        let made = (next / BLOCK / threads * BLOCK + next % BLOCK) as f64;
+        let predicted = self.chosen_s * made;
+        let slower = if made < TOLD { 1.0 } else { now.duration_since(self.begun).as_secs_f64() / predicted };
+        let left = self.lowest_s * slower.max(1.0) * in_a_row(self.readings.saturating_sub(next));
+        self.end.saturating_duration_since(now).as_secs_f64() <= left
     }
 }
 
@@ -71,8 +82,10 @@ impl Job<'_> {
             each * in_a_row(readings.len())
         };
         let (predicted_s, count) = (predict(COARSEST), readings.len());
-        let each_s = predicted_s / count.max(1) as f64;
-        let deadline = Deadline { end: clock + time.min(LONGEST), each_s, readings: count };
+        let each = |predicted_s: f64| predicted_s / in_a_row(count).max(1.0);
+        let lowest_s = each(predicted_s);
+        let end = clock + time.min(LONGEST);
+        let deadline = Deadline { begun: clock, end, chosen_s: lowest_s, lowest_s, readings: count };
         let mut best = Affordable { accuracy: COARSEST, predicted_s, fits: false, deadline };
         best.fits = best.predicted_s + clock.elapsed().as_secs_f64() <= budget;
         let mut accuracy = COARSEST * STEP;
@@ -81,10 +94,12 @@ impl Job<'_> {
             if predicted_s + clock.elapsed().as_secs_f64() > budget {
                 break;
             }
+            let deadline = Deadline { chosen_s: each(predicted_s), ..deadline };
             best = Affordable { accuracy, predicted_s, fits: true, deadline };
             accuracy *= STEP;
         }
         drop(kept);
+        best.deadline.begun = Instant::now();
         best
     }
 }
@@ -94,4 +109,32 @@ fn in_a_row(readings: usize) -> f64 {
     let blocks = readings.div_ceil(BLOCK);
     let threads = rayon::current_num_threads().max(1);
     readings.min(blocks.div_ceil(threads) * BLOCK) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A second for 1000 readings, by thread, of which 0.1 s is what the lowest orders take: late where the clock says so, and where readings took five
+    /// times as long as was thought, for then the lowest orders will too.
+    #[test]
+    fn readings_that_take_longer_than_was_thought_press_sooner() {
+        let threads = rayon::current_num_threads();
+        let (now, readings) = (Instant::now(), 1000 * threads);
+        let ago = |s: f64| now.checked_sub(Duration::from_secs_f64(s)).expect("a clock that is older");
+        let at = |elapsed: f64| Deadline {
+            begun: ago(elapsed),
+            end: now + Duration::from_secs_f64(1.0 - elapsed),
+            chosen_s: 8e-4,
+            lowest_s: 1e-4,
+            readings,
+        };
+        // 100 readings of a thread in 0.08 s, as predicted; in 0.8 s, when 0.1 s for the rest becomes 0.9 s.
+        assert!(!at(0.08).presses(100));
+        assert!(at(0.8).presses(100));
+        // Five times too slow: 0.45 s are needed for the rest, 0.6 s and 0.4 s are there.
+        assert!(!at(0.4).presses(100) && Deadline { end: now + Duration::from_secs_f64(0.4), ..at(0.4) }.presses(100));
+        // Too few to tell.
+        assert!(!at(0.4).presses(10));
+    }
 }

@@ -10,12 +10,11 @@ use rayon::prelude::*;
 
 use super::actual::Actual;
 use super::effects::{self, Block, EXPOSURE, LIGHT, Maker, NOISE, Step, quantisation};
-use super::forward::Job;
+use super::forward::{BLOCK, Job};
 use super::raw::Raw;
 use super::reading::{Kind, Reading};
 use super::reduce::reduce;
 use crate::control::{Control, Stop};
-use crate::numeric::sum::BLOCK;
 
 /// A relative change over readings, 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

@@ -19,7 +19,9 @@ use super::simulate::Truth;
 use crate::brdf::Material;
 use crate::control::{Control, counted};
 use crate::measurement::{Dimension, Directions, STOPPED, Weights};
-use crate::numeric::sum::BLOCK;
+
+/// Readings that a thread takes at once: few enough that a small scan is work for all.
+pub(super) const BLOCK: usize = 256;
 
 /// What is to be read, and how.
 pub struct Job<'a> {

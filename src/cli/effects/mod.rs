@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::json;
 
-mod of_scene;
+pub(super) mod of_scene;
 
 use super::failure::Failure;
 use super::output::read_text;

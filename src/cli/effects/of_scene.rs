@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{Args, share};
 use crate::chain::{SceneEffect, SceneEffects, Stage, load, render_material, scene_effects};
@@ -42,12 +42,17 @@ pub(super) fn run(stage: &Stage, args: &Args, ui: &Ui) -> Result<(), Failure> {
     let (samples, seed) = (args.samples.unwrap_or(SAMPLES), args.what.seed.unwrap_or(0));
     let options = Options { width, height, samples, seed, ..Options::default() };
     let found = scene_effects(stage, subject, &options, ui.control())?;
-    let object = json!({
-        "scene": stage.spec.name, "width": width, "height": height, "samples": samples, "seed": seed, "seconds": found.seconds,
-        "seconds_full": found.seconds_full, "full_off_by": found.full_off_by, "noise": found.noise, "effects": found.effects,
-    });
-    ui.result(&table(&stage.spec.name, &options, &found), &object);
+    ui.result(&table(&stage.spec.name, &options, &found), &object(&stage.spec.name, &options, &found));
     Ok(())
+}
+
+/// As `--json` prints it, and a report reads it.
+pub(in crate::cli) fn object(name: &str, options: &Options, found: &SceneEffects) -> Value {
+    let Options { width, height, samples, seed, .. } = options;
+    json!({
+        "scene": name, "width": width, "height": height, "samples": samples, "seed": seed, "seconds": found.seconds,
+        "seconds_full": found.seconds_full, "full_off_by": found.full_off_by, "noise": found.noise, "effects": found.effects,
+    })
 }
 
 /// Effects that are on with their numbers, then those that are off with the reason.
