@@ -12,7 +12,7 @@ use goniofit::numeric::random::{Purpose, RngExt, stream};
 /// A file of `data-fixtures/invalid`, and what its error must say of place, expected and found.
 type Broken = (&'static str, [&'static str; 3]);
 
-const CSV: [Broken; 38] = [
+const CSV: [Broken; 39] = [
     ("csv-text-for-number.csv", ["line 3, column r", "expected a number", "found \"bright\""]),
     ("csv-text-for-angle.csv", ["line 2, column theta_o_deg", "expected a number", "found \"ten\""]),
     ("csv-extra-column.csv", ["line 3", "expected 5 cells", "found 6"]),
@@ -54,6 +54,10 @@ const CSV: [Broken; 38] = [
     (
         "csv-unknown-mask-reason.csv",
         ["line 3, column mask_reason", "expected saturated, unread, shadowed, unlit, or nothing", "found \"cloudy\""],
+    ),
+    (
+        "csv-mask-reason-beside-a-value.csv",
+        ["line 2, column mask_reason", "expected nothing, for every channel has a value", "found \"shadowed\""],
     ),
     ("csv-raw-readings.csv", ["line 1", "raw readings", "goniofit reduce"]),
     ("csv-not-utf8.csv", ["line 3", "expected text in UTF-8", "found other bytes"]),

@@ -50,6 +50,7 @@ FILES = {
     "csv-grid-rows-missing.csv": f"# grid: merl-edge\n{ANGLES},r,g,b\n0,0,0,0,0.1,0.1,0.1\n",
     "csv-negative-weight.csv": f"{ANGLES},r,weight\n0,0,10,0,0.1,-1\n",
     "csv-unknown-mask-reason.csv": f"{ANGLES},r,mask_reason\n0,0,10,0,0.1,\n0,0,20,0,,cloudy\n",
+    "csv-mask-reason-beside-a-value.csv": f"{ANGLES},r,mask_reason\n0,0,10,0,0.1,shadowed\n",
     "csv-raw-readings.csv": f"{ANGLES},kind,time_s,exposure_s,repeat,signal_r\n0,0,10,0,sample,0,1,0,1000\n",
     "csv-not-utf8.csv": f"{ANGLES},r\n0,0,10,0,0.1\n".encode() + b"0,0,20,0,\xb50.1\n",
     "alta-no-dim.alta": "#PARAM_IN COS_TH\n0.5 0.1\n",

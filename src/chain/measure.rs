@@ -35,7 +35,7 @@ pub fn measure(
         let read = |scan: &Scan, control: Control<'_>| simulate(name, truth, channels, instrument, scan, seed, control);
         let look = |scan: &Scan, control: Control<'_>| {
             let table = read(scan, control)?;
-            Some(Look { table, time_s: Vec::new(), saturated: Vec::new() })
+            Some(Look { table, time_s: Vec::new() })
         };
         read(&chosen(scan, source, instrument, control, look), control)
     })?;

@@ -1,66 +1,84 @@
 //! What accuracy costs in a run, small enough to be measured for every report: the curves of fit and picture, and what each effect of the scene is worth.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use super::effects::of_scene;
 use super::failure::Failure;
 use super::output::{make_folder, write_text};
+use super::tradeoff::usual_parts;
 use super::ui::{self, Ui};
 use crate::brdf::ModelSpec;
-use crate::chain::{self, Demo, Stage};
+use crate::chain::{self, Demo, Source, Stage};
 use crate::fit::{FitOptions, Loss};
 use crate::measurement::{ReadOptions, formats};
-use crate::render::Options;
+use crate::render::{Material, Options};
 use crate::tradeoff::fit::FitSweep;
 use crate::tradeoff::render::{RenderSweep, Way};
 use crate::tradeoff::{Effort, Sweep, fit, render};
 
-/// Time of a curve at most: what would end later is not begun.
-const TIME: Duration = Duration::from_secs(5);
+/// Trials of each setting.
 const TRIALS: u32 = 4;
-/// Pictures' longer side, pixels, and samples of a pixel.
+/// Width and height of the pictures, pixels, and samples of a pixel.
 const SIDE: u32 = 64;
 const SAMPLES: [u32; 6] = [4, 8, 16, 32, 64, 128];
-/// Every how many-th direction is fitted.
-const PARTS: [usize; 6] = [112, 56, 28, 14, 7, 1];
 /// Shares by which a fit's rmse may exceed the least one.
 const TARGETS: [f64; 3] = [0.1, 0.01, 0.001];
+/// What is written, in folders of their own and in the run's.
+const OF_FIT: &str = "accuracy-fit";
+const OF_PICTURE: &str = "accuracy-render";
+const CURVE: &str = "tradeoff.json";
+const EFFECTS: &str = "effects.json";
 
-/// Measures a demo's and writes them where its report looks for them; nothing where the work was stopped.
-pub(super) fn of_demo(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) -> Result<(), Failure> {
-    let work: [&dyn Fn() -> Result<(), Failure>; 3] =
-        [&|| of_fit(folder, seed, ui), &|| of_picture(folder, demo, seed, ui), &|| of_effects(folder, demo, seed, ui)];
-    work.iter().take_while(|_| !ui::stop().requested()).try_for_each(|measure| measure())
+/// Measures a demo's and writes them where its report looks for them. What can't be measured, and what was stopped, is said and left out: the run is
+/// whole without.
+pub(super) fn of_demo(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) {
+    // An earlier run's are not this one's.
+    for old in [folder.join(OF_FIT).join(CURVE), folder.join(OF_PICTURE).join(CURVE), folder.join(EFFECTS)] {
+        let _ = std::fs::remove_file(old);
+    }
+    let measured = measure(folder, demo, seed, ui);
+    if let Err(failure) = measured {
+        ui.warn(&format!("what accuracy costs is not on the page: {}", failure.message));
+    } else if ui::stop().requested() {
+        ui.warn("stopped: what accuracy costs is not on the page, or not all of it");
+    }
 }
 
-fn effort(seed: u64) -> Effort {
-    Effort { trials: TRIALS, seed, deadline: Some(Instant::now() + TIME) }
+fn measure(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) -> Result<(), Failure> {
+    let effort = Effort { trials: TRIALS, seed, deadline: None };
+    of_fit(folder, &effort, ui)?;
+    let stage = Stage::built_in(demo.scene)?;
+    let subject = chain::render_material(demo.name, &Source::Fitted(Box::new(demo.truth.clone())), None)?;
+    of_picture(folder, (demo, &stage, &subject), &effort, ui)?;
+    of_effects(folder, (&stage, subject), seed, ui)
 }
 
 /// Directions used, against what the fit is off.
-fn of_fit(folder: &Path, seed: u64, ui: &Ui) -> Result<(), Failure> {
+fn of_fit(folder: &Path, effort: &Effort, ui: &Ui) -> Result<(), Failure> {
     let file = folder.join("measurement.csv");
     let table = formats::read(&file, &ReadOptions::default())?;
     let model: ModelSpec = "lambert+phong".parse().map_err(|e| Failure::work(format!("{e}")))?;
     let what = FitSweep {
         options: FitOptions::new(model.clone()),
-        parts: PARTS.to_vec(),
+        parts: usual_parts(table.len()),
         strides: Vec::new(),
         targets: TARGETS.to_vec(),
         losses: vec![Loss::default()],
         models: vec![model],
     };
-    let found = fit::sweep(&table, &what, &effort(seed), ui.control())?;
-    write(folder, "accuracy-fit", &Sweep { command: format!("goniofit fit {}", file.display()), ..found })
+    let found = fit::sweep(&table, &what, effort, ui.control())?;
+    write(&folder.join(OF_FIT), &Sweep { command: format!("goniofit fit {}", file.display()), ..found })
 }
 
 /// Samples of a pixel, against what the picture is off; by the scene's plan, and by the integrator that has everything on.
-fn of_picture(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) -> Result<(), Failure> {
-    let stage = Stage::built_in(demo.scene)?;
-    let subject = chain::render_material(demo.name, &chain::load(demo.name, &ReadOptions::default())?, None)?;
+fn of_picture(
+    folder: &Path,
+    (demo, stage, subject): (&Demo, &Stage, &Material),
+    effort: &Effort,
+    ui: &Ui,
+) -> Result<(), Failure> {
     let what = RenderSweep {
         size: (SIDE, SIDE),
         samples: SAMPLES.to_vec(),
@@ -68,31 +86,31 @@ fn of_picture(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) -> Result<(), Fail
         ways: vec![Way::Scene, Way::Full],
         reference: None,
     };
-    let found = render::sweep(&stage, Some(&subject), &what, &effort(seed), ui.control())?;
-    let command =
-        format!("goniofit render --scene {} --material {} --size {SIDE}x{SIDE} --out OUT.exr", demo.scene, demo.name);
-    write(folder, "accuracy-render", &Sweep { command, ..found })
+    let found = render::sweep(stage, Some(subject), &what, effort, ui.control())?;
+    let Demo { scene, name, .. } = demo;
+    let command = format!("goniofit render --scene {scene} --material {name} --size {SIDE}x{SIDE} --out OUT.exr");
+    write(&folder.join(OF_PICTURE), &Sweep { command, ..found })
 }
 
-/// What each effect of the scene takes, and by how much the picture is off without it.
-fn of_effects(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) -> Result<(), Failure> {
-    let stage = Stage::built_in(demo.scene)?;
-    let subject = chain::render_material(demo.name, &chain::load(demo.name, &ReadOptions::default())?, None)?;
+/// What each effect of the scene takes, and by how much the picture is off without it; nothing where it was stopped.
+fn of_effects(folder: &Path, (stage, subject): (&Stage, Material), seed: u64, ui: &Ui) -> Result<(), Failure> {
     let options = Options { width: SIDE, height: SIDE, samples: SAMPLES[4], seed, ..Options::default() };
-    let found = chain::scene_effects(&stage, Some(subject), &options, ui.control())?;
-    let object = of_scene::object(demo.scene, &options, &found);
-    write_text(&folder.join("effects.json"), &pretty(&object)?)
+    let found = chain::scene_effects(stage, Some(subject), &options, ui.control())?;
+    if ui::stop().requested() {
+        return Ok(());
+    }
+    let object = of_scene::object(&stage.spec.name, &options, &found);
+    write_text(&folder.join(EFFECTS), &pretty(&object)?)
 }
 
-/// Writes a curve into a folder of its own; nothing where no trial was over in time.
-fn write(folder: &Path, name: &str, sweep: &Sweep) -> Result<(), Failure> {
+/// Writes a curve into a folder of its own; nothing where no trial was over before the work was stopped.
+fn write(folder: &Path, sweep: &Sweep) -> Result<(), Failure> {
     if sweep.curves.is_empty() {
         return Ok(());
     }
-    let folder = folder.join(name);
-    make_folder("--out", &folder)?;
+    make_folder("--out", folder)?;
     let object = serde_json::to_value(sweep).map_err(|e| Failure::work(e.to_string()))?;
-    write_text(&folder.join("tradeoff.json"), &pretty(&object)?)
+    write_text(&folder.join(CURVE), &pretty(&object)?)
 }
 
 fn pretty(object: &Value) -> Result<String, Failure> {

@@ -57,7 +57,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     object["out"] = serde_json::json!(args.out);
     let mut look = "sheet.png".to_owned();
     if args.report {
-        costs::of_demo(&args.out, &demo, args.seed, ui)?;
+        costs::of_demo(&args.out, &demo, args.seed, ui);
         let page = report::of_folder(&args.out, &RunOptions::default())?;
         object["report"] = serde_json::json!(page);
         look += " and report.html";

@@ -131,7 +131,7 @@ struct How {
     seconds: f64,
 }
 
-/// A budget that is exceeded by more than this share and these seconds is said.
+/// Where readings end later than this times the budget and this many seconds, it is said.
 const LATE: (f64, f64) = (1.1, 0.05);
 
 /// Reads, with the accuracy and the effects that were asked for.

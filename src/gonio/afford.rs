@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::effects;
-use super::forward::{BLOCK, Job};
+use super::forward::{Job, block_of};
 use crate::control::Control;
 
 /// Readings that are tried, and those before that make what all readings share: tables of lobes through cones.
@@ -36,6 +36,7 @@ pub struct Affordable {
 /// When all readings have to be made, and how long one takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deadline {
+    /// When the first reading was begun.
     begun: Instant,
     end: Instant,
     /// Predicted seconds of a reading of one thread, with the accuracy that was chosen and with the lowest orders.
@@ -44,20 +45,29 @@ pub struct Deadline {
     readings: usize,
 }
 
-/// Readings of one thread from which on their time tells how far the prediction is off.
-const TOLD: f64 = 32.0;
+/// Share of the predicted time of all readings that their prediction counts for beside what was made so far, of which the beginning may be dear.
+const PREDICTED: f64 = 0.1;
 
 impl Deadline {
-    /// Whether those from number `next` on are late unless they take the lowest orders. Trials that underrate a reading do so of all orders: what was
-    /// made so far says by how much.
+    /// The same for readings that begin now.
+    pub(super) fn begun_now(self) -> Self {
+        Self { begun: Instant::now(), ..self }
+    }
+
+    /// Whether those from number `next` on are late unless they take the lowest orders. Trials miss readings that take long, on sharp flanks, with any
+    /// order: what was made so far says by how much.
     pub(super) fn presses(&self, next: usize) -> bool {
         let now = Instant::now();
-        let threads = rayon::current_num_threads().max(1);
-        let made = (next / BLOCK / threads * BLOCK + next % BLOCK) as f64;
-        let predicted = self.chosen_s * made;
-        let slower = if made < TOLD { 1.0 } else { now.duration_since(self.begun).as_secs_f64() / predicted };
-        let left = self.lowest_s * slower.max(1.0) * in_a_row(self.readings.saturating_sub(next));
-        self.end.saturating_duration_since(now).as_secs_f64() <= left
+        let (size, threads) = (block_of(self.readings), rayon::current_num_threads().max(1));
+        let (block, blocks) = (next / size, self.readings.div_ceil(size));
+        let made = block / threads * size + next % size;
+        let left = ((block + 1) * size).min(self.readings).saturating_sub(next)
+            + (blocks - 1).saturating_sub(block) / threads * size;
+        let foreseen = self.chosen_s * PREDICTED * in_a_row(self.readings);
+        let elapsed = now.duration_since(self.begun).as_secs_f64();
+        let slower = (elapsed + foreseen) / (self.chosen_s * made as f64 + foreseen);
+        let left_s = self.lowest_s * slower.max(1.0) * left as f64;
+        self.end.saturating_duration_since(now).as_secs_f64() <= left_s
     }
 }
 
@@ -77,7 +87,7 @@ impl Job<'_> {
         let predict = |accuracy: f64| {
             let trial = Job { accuracy, ..*self };
             let start = Instant::now();
-            let read = trial.read(some.clone(), &actual, Control::silent());
+            let read = on_one_thread(|| trial.read(some.clone(), &actual, Control::silent()));
             let each = start.elapsed().as_secs_f64() / read.readings.len().max(1) as f64;
             each * in_a_row(readings.len())
         };
@@ -99,42 +109,62 @@ impl Job<'_> {
             accuracy *= STEP;
         }
         drop(kept);
-        best.deadline.begun = Instant::now();
         best
+    }
+}
+
+/// What `work` comes to on a thread alone, whose time is that of all it does; on all where the system has none to give.
+fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(alone) => alone.install(work),
+        Err(_) => work(),
     }
 }
 
 /// Readings that one thread makes in a row: blocks are shared out whole.
 fn in_a_row(readings: usize) -> f64 {
-    let blocks = readings.div_ceil(BLOCK);
-    let threads = rayon::current_num_threads().max(1);
-    readings.min(blocks.div_ceil(threads) * BLOCK) as f64
+    let (block, threads) = (block_of(readings), rayon::current_num_threads().max(1));
+    readings.min(readings.div_ceil(block).div_ceil(threads) * block) as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A second for 1000 readings, by thread, of which 0.1 s is what the lowest orders take: late where the clock says so, and where readings took five
-    /// times as long as was thought, for then the lowest orders will too.
+    /// So many blocks of a thread, of which ten are made.
     #[test]
     fn readings_that_take_longer_than_was_thought_press_sooner() {
-        let threads = rayon::current_num_threads();
-        let (now, readings) = (Instant::now(), 1000 * threads);
-        let ago = |s: f64| now.checked_sub(Duration::from_secs_f64(s)).expect("a clock that is older");
-        let at = |elapsed: f64| Deadline {
-            begun: ago(elapsed),
-            end: now + Duration::from_secs_f64(1.0 - elapsed),
-            chosen_s: 8e-4,
-            lowest_s: 1e-4,
-            readings,
+        let threads = rayon::current_num_threads().max(1);
+        let readings = 32 * threads * 4096;
+        let now = Instant::now();
+        let presses = |elapsed_s: f64, left_s: f64| {
+            let begun = now.checked_sub(Duration::from_secs_f64(elapsed_s)).expect("a clock that is older");
+            let end = now + Duration::from_secs_f64(left_s);
+            Deadline { begun, end, chosen_s: 1e-5, lowest_s: 1e-6, readings }.presses(10 * threads * 4096)
         };
-        // 100 readings of a thread in 0.08 s, as predicted; in 0.8 s, when 0.1 s for the rest becomes 0.9 s.
-        assert!(!at(0.08).presses(100));
-        assert!(at(0.8).presses(100));
-        // Five times too slow: 0.45 s are needed for the rest, 0.6 s and 0.4 s are there.
-        assert!(!at(0.4).presses(100) && Deadline { end: now + Duration::from_secs_f64(0.4), ..at(0.4) }.presses(100));
-        // Too few to tell.
-        assert!(!at(0.4).presses(10));
+        // As predicted, 40,960 readings in 0.41 s: the lowest orders need 0.09 s for the 22 blocks that are left.
+        assert!(!presses(0.41, 0.2) && presses(0.41, 0.05));
+        // Five times as long: the prediction of 1.3 s counts for a tenth, so that they need four times as long, 0.36 s.
+        assert!(presses(2.05, 0.3) && !presses(2.05, 0.5));
+        // Sooner than predicted is no reason to count on it.
+        assert!(presses(0.01, 0.08));
+    }
+
+    /// Blocks hold all readings once, and no stop is cut but one that is longer than a block may be.
+    #[test]
+    fn blocks_are_whole_stops() {
+        use crate::gonio::forward::blocks_of;
+        use crate::gonio::reading::{Kind, Reading};
+        let reading =
+            |stop: u32| Reading { kind: Kind::Sample, entry: None, stop, time_s: 0.0, exposure_s: 1.0, repeat: 0 };
+        for (stops, each) in [(1u32, 1), (50, 7), (3000, 3), (2, 9000)] {
+            let all: Vec<Reading> = (0..stops).flat_map(|stop| (0..each).map(move |_| reading(stop))).collect();
+            let blocks = blocks_of(&all);
+            assert!(blocks.windows(2).all(|b| b[0].end == b[1].start) && blocks[0].start == 0);
+            assert_eq!(blocks.last().map(|b| b.end), Some(all.len()));
+            let cut = |end: usize| end < all.len() && all[end].stop == all[end - 1].stop;
+            assert!(each > 4096 || blocks.iter().all(|b| !cut(b.end)), "{stops} {each}");
+            assert!(blocks.iter().all(|b| b.len() < 4096 + each));
+        }
     }
 }

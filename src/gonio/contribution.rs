@@ -4,13 +4,14 @@
 //! |a − b|/max(|a|, |b|), so that they lie between 0 and 1 whatever is 0; of noise it is σ over the reading, 1 at most. What acts on the flux or the
 //! electrons only starts from light that is worked out once.
 
+use std::ops::Range;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::actual::Actual;
 use super::effects::{self, Block, EXPOSURE, LIGHT, Maker, NOISE, Step, quantisation};
-use super::forward::{BLOCK, Job};
+use super::forward::{Job, blocks_of};
 use super::raw::Raw;
 use super::reading::{Kind, Reading};
 use super::reduce::reduce;
@@ -91,9 +92,8 @@ pub(super) struct Study<'a> {
 impl<'a> Study<'a> {
     /// Once `stop` is requested what it says means nothing.
     pub fn new(job: &'a Job<'a>, readings: &'a [Reading], actual: &'a Actual, stop: &'a Stop) -> Self {
-        let range = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(readings.len());
-        let block = |b: usize| job.block(&readings[range(b)], b * BLOCK);
-        let fresh: Vec<Block<'a>> = (0..readings.len().div_ceil(BLOCK)).map(block).collect();
+        let block = |range: Range<usize>| job.block(&readings[range.clone()], range.start);
+        let fresh: Vec<Block<'a>> = blocks_of(readings).into_iter().map(block).collect();
         let maker = Maker { stop, ..job.maker(actual) };
         let all = effects::passes(&maker, job.left_out);
         let (lit, mut times) = apply(&fresh, &all[..after(&all, LIGHT)]);

@@ -1,6 +1,7 @@
 //! The forward simulation: a truth, an instrument and directions to raw readings.
 
 use std::collections::HashSet;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
@@ -20,8 +21,27 @@ use crate::brdf::Material;
 use crate::control::{Control, counted};
 use crate::measurement::{Dimension, Directions, STOPPED, Weights};
 
-/// Readings that a thread takes at once: few enough that a small scan is work for all.
-pub(super) const BLOCK: usize = 256;
+/// Of how many readings a block is that a thread takes at once, about: few enough that a small scan is work for all.
+pub(super) fn block_of(all: usize) -> usize {
+    (all / 32).clamp(32, MOST)
+}
+
+/// Readings of a block at most.
+const MOST: usize = 4096;
+
+/// Readings in blocks, in order of time: whole stops, whose mean over cones is made once, unless one alone is long.
+pub(super) fn blocks_of(readings: &[Reading]) -> Vec<Range<usize>> {
+    let (n, size) = (readings.len(), block_of(readings.len()));
+    let (mut blocks, mut start) = (Vec::new(), 0);
+    for end in 1..=n {
+        let is_whole = end == n || readings[end].stop != readings[end - 1].stop;
+        if end == n || end - start >= MOST || is_whole && end - start >= size {
+            blocks.push(start..end);
+            start = end;
+        }
+    }
+    blocks
+}
 
 /// What is to be read, and how.
 pub struct Job<'a> {
@@ -126,19 +146,17 @@ impl Job<'_> {
         deadline: Option<Deadline>,
         control: Control<'_>,
     ) -> Raw {
+        let deadline = deadline.map(Deadline::begun_now);
         let passes = effects::passes(&Maker { stop: control.stop, deadline, ..self.maker(actual) }, self.left_out);
-        let (n, width) = (readings.len(), self.channels.len());
-        control.progress.start("reading", n as u64);
+        let (width, ranges) = (self.channels.len(), blocks_of(&readings));
+        control.progress.start("reading", readings.len() as u64);
         let next = AtomicUsize::new(0);
         // Blocks are taken in order of time, so that what is read before a stop has no holes.
         let worker = |_| {
             let mut done = Vec::new();
             while !control.stop.requested() {
                 let b = next.fetch_add(1, Ordering::Relaxed);
-                let range = b.saturating_mul(BLOCK).min(n)..(b + 1).saturating_mul(BLOCK).min(n);
-                if range.is_empty() {
-                    break;
-                }
+                let Some(range) = ranges.get(b) else { break };
                 let mut block = self.block(&readings[range.clone()], range.start);
                 passes.iter().for_each(|step| step.pass.apply(&mut block));
                 control.progress.advance(block.done as u64);
@@ -152,11 +170,12 @@ impl Job<'_> {
         control.progress.finish();
         blocks.sort_unstable_by_key(|(b, ..)| *b);
         // Up to the first block that is missing, and with the first that is not whole.
-        let whole = blocks.iter().enumerate().take_while(|(k, (b, done, ..))| k == b && *done == BLOCK).count();
+        let is_whole = |(k, (b, done, ..)): &(usize, &(usize, usize, _, _))| k == b && *done == ranges[*b].len();
+        let whole = blocks.iter().enumerate().take_while(is_whole).count();
         let part = blocks.get(whole).filter(|(b, ..)| *b == whole).map_or(0, |(_, done, ..)| *done);
         blocks.truncate(whole + usize::from(part > 0));
         let quadrature_error = blocks.iter().map(|b| b.3).fold(0.0, f64::max);
-        let (kept, note) = ended(&readings, whole * BLOCK + part);
+        let (kept, note) = ended(&readings, ranges[..whole].last().map_or(0, |range| range.end) + part);
         let mut signal = Vec::with_capacity(kept * width);
         blocks.into_iter().for_each(|(.., part, _)| signal.extend(part));
         readings.truncate(kept);

@@ -1,8 +1,8 @@
 //! Measurements: the table, its weights and masks, its file formats, its use as a BRDF.
 //!
 //! In: files, or readings reduced by [`crate::gonio`]. Out: [`Measurement`], with directions in the local frame and values in
-//! 1/sr (1/rad in the flat world). The one decision to know: a masked value is stored as NaN, in its own channel, and the
-//! reasons are counted in [`Masked`]; whoever reads values asks [`Measurement::value`], which returns an `Option`.
+//! 1/sr (1/rad in the flat world). The one decision to know: a masked value is stored as NaN, in its own channel; what a file
+//! masks is counted in [`Masked`], why an instrument's reduction does stands in `reasons`; whoever reads values asks [`Measurement::value`], which returns an `Option`.
 
 pub mod error;
 pub mod formats;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// Why a pair of directions has no value, in one channel at least.
+/// Why a pair of directions has no value, in one channel at least; of several reasons the first one here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MaskReason {

@@ -150,7 +150,7 @@ pub struct Measurement {
     pub weights: Weights,
     /// What is masked, and why.
     pub masked: Masked,
-    /// Of each entry, why it has no value in a channel, where the instrument's reduction tells; empty where nobody does.
+    /// Of each entry, why it has no value in a channel, where the reduction of a stop there tells; empty where none does.
     pub reasons: Vec<Option<MaskReason>>,
     /// The format's own way to evaluate the BRDF anywhere, where it has one (RGL).
     pub evaluator: Option<std::sync::Arc<dyn Brdf>>,

@@ -17,6 +17,10 @@ fn a_plan_is_a_scan_that_keeps_its_budget_and_is_measured_as_planned() {
         assert_eq!(number(&series[2]["hours"]), 0.1);
         let is_read = |point: &serde_json::Value| i == 0 || number(&point["hours"]) >= number(&scan["hours"]);
         assert!(series.iter().all(|point| point["median"].is_array() == is_read(point)), "{scan}");
+        // Read for as long as it takes once it is as precise as it is.
+        let once = series.iter().find(|point| number(&point["hours"]) == number(&scan["hours"]));
+        let stated = scan["errors"].as_array().expect("a list").iter().map(|e| &e["relative"][1]);
+        assert!(once.is_none_or(|point| stated.eq(point["median"].as_array().expect("a list"))), "{scan}");
         let errors: Vec<f64> = series.iter().filter_map(|p| p["median"][2].as_f64()).collect();
         assert!(errors.windows(2).all(|e| e[1] <= e[0] * (1.0 + 1e-12)), "{errors:?}");
     }

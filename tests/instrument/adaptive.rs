@@ -121,7 +121,7 @@ fn where_the_truth_is_not_known_nothing_is_refined() {
     let (instrument, channels) = (Instrument::default(), vec!["y".to_owned()]);
     let look = |scan: &Scan, control: Control<'_>| {
         let table = simulate("m", &truth, &channels, &instrument, scan, 3, control)?;
-        Some(Look { table, time_s: vec![], saturated: vec![] })
+        Some(Look { table, time_s: vec![] })
     };
     let wish = Adaptive { pairs: 500, dimension: Dimension::Space, instrument: &instrument };
     let scan = adapt(&wish, Control::silent(), look);

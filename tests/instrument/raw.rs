@@ -102,7 +102,7 @@ fn repeats_count_whatever_the_order_of_exposures() {
 /// Why a pair has no value stands in its row of the file, and comes back: an empty cell alone would not tell a full well from a shadow.
 #[test]
 fn every_masked_pair_says_why() {
-    let detector = goniofit::gonio::parts::Detector { full_well: 500.0, ..Default::default() };
+    let detector = Detector { full_well: 500.0, ..Default::default() };
     let surroundings = Surroundings { shadow_deg: 2.0, ..Default::default() };
     let instrument = Instrument { electrons: 100.0, read_noise: 0.0, detector, surroundings, ..Instrument::default() };
     let log = "0,0,60,0,sample,0,1,0,50\n30,0,30,180,sample,1,1,0,500\n30,0,30,180,sample,2,9,0,500\n\
@@ -132,6 +132,23 @@ fn every_masked_pair_says_why() {
     // Where nothing is masked nobody is told why.
     let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{HEADER}0,0,60,0,sample,0,1,0,50\n")).expect("valid");
     assert!(goniofit::gonio::reduce("m", &raw, &instrument, None).expect("reduced").measurement.reasons.is_empty());
+}
+
+/// What counts is the pair: a channel that saturates is enough, a later stop that does not mends it, an exposure that is missing tells nothing of a well, and of
+/// several reasons the first is said. A pair that nobody stopped at has none.
+#[test]
+fn of_channels_and_stops_a_masked_pair_says_the_first_reason() {
+    let detector = Detector { full_well: 500.0, ..Default::default() };
+    let instrument = Instrument { electrons: 100.0, read_noise: 0.0, detector, ..Instrument::default() };
+    let head = HEADER.trim_end().to_owned() + ",signal_z\n";
+    let log = "0,0,10,0,sample,0,1,0,50,500\n0,0,20,0,sample,1,1,0,,500\n0,0,30,0,sample,2,1,0,500,500\n0,0,40,0,sample,3,1,0,,50\n\
+        0,0,50,0,sample,4,1,0,,\n0,0,50,0,sample,5,9,0,500,500\n0,0,30,0,sample,16,1,0,50,50\n";
+    let (raw, _) = Raw::from_csv(Path::new("r.csv"), &format!("{head}{log}")).expect("valid");
+    let m = goniofit::gonio::reduce("m", &raw, &instrument, None).expect("reduced").measurement;
+    let (saturated, unread) = (Some(MaskReason::Saturated), Some(MaskReason::Unread));
+    assert_eq!(m.reasons, [saturated, saturated, None, unread, unread]);
+    assert_eq!((m.value(0, 0).is_some(), m.value(1, 0)), (true, None));
+    assert!(m.value(0, 2).is_some() && m.value(1, 3).is_some() && m.value(0, 3).is_none());
 }
 
 /// Without a reference nothing tells how far the source's power has walked. Two readings differ by what it walked between them, and not by less because

@@ -58,10 +58,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     let mut parts = descending(&args.parts);
     if parts.is_empty() && args.strides.is_empty() {
-        parts =
-            std::iter::successors(Some(FIRST), |n| Some(n * GROWTH)).take_while(|n| table.len() / n >= LEAST).collect();
-        parts.insert(0, 1);
-        parts.reverse();
+        parts = usual_parts(table.len());
     }
     let strides = descending(&args.strides);
     let [Some(model), Some(loss)] = [args.models.first().map(|_| 0), args.losses.first().map(|_| 0)] else {
@@ -75,6 +72,15 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let mut found = sweep(&table, &what, &args.common.effort(args.seed, ui), ui.control())?;
     found.command = format!("goniofit fit {}", args.file.display());
     args.common.finish(&found, None, ui)
+}
+
+/// Parts of a table of so many directions that are tried where none are asked for, the smallest first.
+pub(in crate::cli) fn usual_parts(len: usize) -> Vec<usize> {
+    let mut parts: Vec<usize> =
+        std::iter::successors(Some(FIRST), |n| Some(n * GROWTH)).take_while(|n| len / n >= LEAST).collect();
+    parts.insert(0, 1);
+    parts.reverse();
+    parts
 }
 
 /// The smallest parts first, which are the fastest.

@@ -3,6 +3,7 @@
 use super::Look;
 use super::chosen::Chosen;
 use crate::gonio::instrument::Instrument;
+use crate::measurement::MaskReason;
 
 /// A gap between two neighbours in θo.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +94,7 @@ impl Bends<'_> {
             (None, Some(b)) => (b, k, Some(k + 2)),
             (None, None) => return None,
         };
-        if self.look.saturated.get(entries[masked]) == Some(&true) {
+        if self.look.table.reasons.get(entries[masked]) == Some(&Some(MaskReason::Saturated)) {
             return Some(f64::INFINITY);
         }
         Some(over(bend(before)?, valid.sigma)).filter(|off| *off > 0.0)

@@ -17,7 +17,7 @@ pub(super) use self::chosen::FIRST_PAIRS;
 use super::forward::Job;
 use super::instrument::Instrument;
 use super::reading::Kind;
-use super::reduce::{reduce, saturation_limit};
+use super::reduce::reduce;
 use super::scan::Scan;
 use crate::control::{Control, Quiet};
 use crate::measurement::{Dimension, Measurement};
@@ -36,8 +36,6 @@ pub struct Look {
     pub table: Measurement,
     /// When each pair was read, s; empty where nothing drifts.
     pub time_s: Vec<f64>,
-    /// Whether a pair is masked in a channel because even the shortest exposure saturates; empty where none does.
-    pub saturated: Vec<bool>,
 }
 
 /// What an adaptive scan is made for.
@@ -115,15 +113,12 @@ impl Job<'_> {
             return None; // stopped
         }
         let table = reduce("look", &raw, self.instrument, None).ok()?.measurement;
-        let (mut time_s, mut saturated) = (vec![0.0; table.len()], vec![false; table.len()]);
-        let limit = saturation_limit(self.instrument);
-        for (i, reading) in raw.readings.iter().enumerate() {
-            let Some(entry) = reading.entry.map(|entry| entry as usize) else { continue };
-            time_s[entry] = reading.time_s;
-            let is_masked = |c: usize| table.value(c, entry).is_none();
-            saturated[entry] |= raw.signals(i).iter().enumerate().any(|(c, signal)| *signal >= limit && is_masked(c));
+        let mut time_s = vec![0.0; table.len()];
+        for reading in &raw.readings {
+            let Some(entry) = reading.entry else { continue };
+            time_s[entry as usize] = reading.time_s;
         }
-        Some(Look { table, time_s, saturated })
+        Some(Look { table, time_s })
     }
 }
 

@@ -224,26 +224,13 @@ impl Work<'_> {
             dimension: self.raw.dimension,
             weights: self.raw.weights.clone(),
             masked: Masked { marked, ..Masked::default() },
-            reasons: self.reasons(&left, &table),
+            reasons: if left.iter().all(Option::is_none) { Vec::new() } else { left },
             sigma: self.noise.is_known().then(|| table.sigma()),
             common: shared.planes(),
             row,
             ..Measurement::new(name, self.raw.directions.clone(), self.raw.channels.clone(), table.values)
         };
         Reduction { measurement, budget, unstated: self.noise.unstated() }
-    }
-
-    /// Why each pair has no value, those among them that nobody stopped at; empty where each has one.
-    fn reasons(&self, left: &[Option<MaskReason>], table: &Table) -> Vec<Option<MaskReason>> {
-        let n = left.len();
-        let unread = |i: usize| table.values.iter().skip(i).step_by(n).all(|v| v.is_nan());
-        let of = |(i, reason): (usize, &Option<MaskReason>)| {
-            let (wi, wo) = self.raw.directions.pair(i);
-            let dark = wi.z <= 0.0 || wo.z <= 0.0;
-            reason.or_else(|| unread(i).then_some(if dark { MaskReason::Unlit } else { MaskReason::Unread }))
-        };
-        let all: Vec<Option<MaskReason>> = left.iter().enumerate().map(of).collect();
-        if all.iter().all(Option::is_none) { Vec::new() } else { all }
     }
 
     /// Reduces one stop at a pair of directions.
@@ -272,7 +259,7 @@ impl Work<'_> {
             let &Some(rate) = rate else {
                 if times[place] == 0 {
                     let reason = if stop.saturated[c] { MaskReason::Saturated } else { MaskReason::Unread };
-                    left[entry] = left[entry].min(Some(reason)).or(Some(reason));
+                    left[entry] = Some(left[entry].map_or(reason, |other| other.min(reason)));
                 }
                 continue;
             };

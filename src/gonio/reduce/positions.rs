@@ -92,7 +92,8 @@ impl<'a> Optics<'a> {
         Self { instrument, dimension, footprint, spot }
     }
 
-    /// Those of a spot seen from its middle: enough to plan with, where what the spot does to a cosine is far below what errors do.
+    /// Those of a spot seen from its middle: enough to plan with. The precision that a plan states changes by 4 % at most by it (the classroom's
+    /// instrument, whose detector is near; by 0.5 % for the other built-in ones), and is known in a ninth of the time.
     fn of_middle(instrument: &'a Instrument) -> Self {
         Self { spot: None, ..Self::new(instrument, Dimension::Space) }
     }

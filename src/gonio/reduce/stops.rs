@@ -37,7 +37,7 @@ pub(super) struct Stop {
     pub time_s: f64,
     /// Channel by channel; `None` where every exposure saturated, or nothing was read.
     pub rates: Vec<Option<Rate>>,
-    /// Whether a reading of it saturated, channel by channel.
+    /// Whether even the shortest exposure of it saturated, channel by channel.
     pub saturated: Vec<bool>,
 }
 
@@ -63,7 +63,7 @@ pub(super) struct Summary {
     pub time_s: f64,
     /// Channel by channel: the longest exposure that does not saturate.
     pub repeats: Vec<Option<Repeats>>,
-    /// Whether a reading of it saturated, channel by channel.
+    /// Whether even the shortest exposure of it saturated, channel by channel.
     saturated: Vec<bool>,
 }
 
@@ -117,7 +117,11 @@ fn combined(raw: &Raw, instrument: &Instrument, (first, run): (usize, &[Reading]
             usable.then(|| Repeats::of(&signals, *exposure))
         })
     };
-    let saturated = |c: usize| (first..first + run.len()).any(|reading| raw.signals(reading)[c] >= limit);
+    let shortest = exposures.last().copied().unwrap_or(0.0);
+    let saturated = |c: usize| {
+        let mut of_shortest = run.iter().enumerate().filter(|(_, reading)| are_same(reading.exposure_s, shortest));
+        of_shortest.any(|(i, _)| raw.signals(first + i)[c] >= limit)
+    };
     let end = run[run.len() - 1];
     let end_s = end.time_s + end.exposure_s;
     Summary {

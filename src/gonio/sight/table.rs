@@ -96,6 +96,7 @@ fn coefficients<const F: usize>(from: f64, to: f64, f: impl Fn(f64) -> [f64; F])
 
 /// The polynomial at x, in pairs of powers and pairs of pairs (Estrin), which wait for each other less than one sum after the other.
 fn polynomial<const F: usize>(c: &[[f64; F]; NODES], x: f64) -> [f64; F] {
+    const { assert!(NODES == 12, "three groups of four") };
     let (x2, x4) = (x * x, (x * x) * (x * x));
     std::array::from_fn(|i| {
         let four = |k: usize| (c[k][i] + x * c[k + 1][i]) + x2 * (c[k + 2][i] + x * c[k + 3][i]);

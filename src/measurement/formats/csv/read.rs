@@ -114,15 +114,17 @@ impl<'a> Table<'a> {
             text.trim().trim_matches('"')
         };
         let divisor = self.directions(line, &cell)?;
+        let mut whole = !columns.channels.is_empty();
         for (channel, &column) in columns.channels.iter().enumerate() {
             let valid = self.value(line, divisor, channel, column, cell(column))?;
+            whole &= valid;
             self.errors(line, divisor, channel, valid, &cell)?;
         }
         if let Some(column) = columns.weight {
             self.weight.push(not_negative(line, &columns.label(column), cell(column))?);
         }
         if let Some(column) = columns.reason {
-            self.reasons.push(reason(line, &columns.label(column), cell(column))?);
+            self.reasons.push(reason(line, &columns.label(column), cell(column), whole)?);
         }
         self.read += 1;
         Ok(())
@@ -264,10 +266,13 @@ fn part_of(line: Line<'_>, column: &str, text: &str, sigma: f64) -> Result<f64, 
     Err(line.invalid(column, format!("a part of sigma_…, so {sigma} at most, of either sign"), quoted(text)))
 }
 
-/// Why a row has no value, where anybody says.
-fn reason(line: Line<'_>, column: &str, text: &str) -> Result<Option<MaskReason>, MeasurementError> {
+/// Why a row has no value, where anybody says; nothing where it is `whole`, with a value in every channel.
+fn reason(line: Line<'_>, column: &str, text: &str, whole: bool) -> Result<Option<MaskReason>, MeasurementError> {
     if text.is_empty() {
         return Ok(None);
+    }
+    if whole {
+        return Err(line.invalid(column, "nothing, for every channel has a value in this row", quoted(text)));
     }
     let expected = || format!("{}, or nothing", MaskReason::ALL.map(MaskReason::name).join(", "));
     MaskReason::find(text).map(Some).ok_or_else(|| line.invalid(column, expected(), quoted(text)))
