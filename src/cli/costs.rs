@@ -18,8 +18,8 @@ use crate::tradeoff::fit::FitSweep;
 use crate::tradeoff::render::{RenderSweep, Way};
 use crate::tradeoff::{Effort, Sweep, fit, render};
 
-/// Trials of each setting.
-const TRIALS: u32 = 4;
+/// Trials of each setting, of the fit and of the picture, which takes ten times as long.
+const TRIALS: [u32; 2] = [16, 4];
 /// Width and height of the pictures, pixels, and samples of a pixel.
 const SIDE: u32 = 64;
 const SAMPLES: [u32; 6] = [4, 8, 16, 32, 64, 128];
@@ -47,11 +47,11 @@ pub(super) fn of_demo(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) {
 }
 
 fn measure(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) -> Result<(), Failure> {
-    let effort = Effort { trials: TRIALS, seed, deadline: None };
-    of_fit(folder, &effort, ui)?;
+    let effort = |trials| Effort { trials, seed, deadline: None };
+    of_fit(folder, &effort(TRIALS[0]), ui)?;
     let stage = Stage::built_in(demo.scene)?;
     let subject = chain::render_material(demo.name, &Source::Fitted(Box::new(demo.truth.clone())), None)?;
-    of_picture(folder, (demo, &stage, &subject), &effort, ui)?;
+    of_picture(folder, (demo, &stage, &subject), &effort(TRIALS[1]), ui)?;
     of_effects(folder, (&stage, subject), seed, ui)
 }
 
