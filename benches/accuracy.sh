@@ -19,6 +19,7 @@ run fit-merl fit "$gold" --parts 1,7,14,28,56,112,224,448,896,1792,3584 --stride
 run fit-models fit "$gold" --models lambert,phong,lambert+phong,lambert+phong+phong --parts 1 --trials 6
 run fit-losses fit "$gold" --losses cosine-l2,l2,log,cuberoot,relative --parts 1 --trials 4
 run render-demo render --scene sphere-on-plane --material glossy-paint --samples 4,8,16,32,64,128,256,512 --targets 10%,5%,2%,1%
+run render-merl render --scene sphere-on-plane --material "$gold" --samples 4,8,16,32,64,128,256,512
 run render-cornell render --scene cornell --depths 1,3 --targets 20%,10%,5%
 run simulate-plain simulate --material glossy-paint --scan hemisphere:10 --knobs readings,exposure,step --trials 16
 run quadrature simulate --material "$gold" --instrument commercial --scan in-plane:15 --knobs quadrature --target-errors 0.3,0.1,1e-2,1e-3,1e-4,1e-5,1e-6,1e-7 --trials 3
@@ -26,3 +27,4 @@ for instrument in standards-lab commercial robot classroom; do
     run "simulate-$instrument" simulate --material glossy-paint --instrument "$instrument" --scan in-plane:5 --knobs readings,effects --average 1,4,16,64
 done
 run chain chain --material glossy-paint --instrument commercial --scan in-plane:5
+run chain-merl chain --material "$gold" --instrument commercial --scan in-plane:5

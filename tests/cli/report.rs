@@ -18,7 +18,7 @@ fn the_demo_and_report_write_the_same_page() {
     assert_eq!(said["report"], "d/report.html");
     let page = b.text("d/report.html");
     // What accuracy costs was measured for it: both curves with their slopes, and the worth of each effect that is on.
-    for (folder, settings) in [("accuracy-fit", 5), ("accuracy-render", 6)] {
+    for (folder, settings) in [("accuracy-fit", 7), ("accuracy-render", 6)] {
         let curve = &b.json_file(&format!("d/{folder}/tradeoff.json"))["curves"][0];
         assert_eq!(curve["points"].as_array().expect("a list").len(), settings, "{folder}: {curve}");
         assert!(curve["slopes"].as_array().is_some_and(|s| !s.is_empty()), "{folder}: {curve}");

@@ -75,7 +75,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 }
 
 /// Parts of a table of so many directions that are tried where none are asked for, the smallest first.
-pub(in crate::cli) fn usual_parts(len: usize) -> Vec<usize> {
+fn usual_parts(len: usize) -> Vec<usize> {
     let mut parts: Vec<usize> =
         std::iter::successors(Some(FIRST), |n| Some(n * GROWTH)).take_while(|n| len / n >= LEAST).collect();
     parts.insert(0, 1);

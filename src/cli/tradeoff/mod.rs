@@ -17,8 +17,6 @@ mod render;
 mod simulate;
 mod write;
 
-pub(super) use fit::usual_parts;
-
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit tradeoff fit gold.binary --out tradeoff/
