@@ -93,7 +93,7 @@ impl<'a> Optics<'a> {
     }
 
     /// Those of a spot seen from its middle: enough to plan with. The precision that a plan states changes by 4 % at most by it (the classroom's
-    /// instrument, whose detector is near; by 0.5 % for the other built-in ones), and is known in a ninth of the time.
+    /// instrument, whose detector is near; by 0.7 % for the commercial one), and is known in a ninth of the time.
     fn of_middle(instrument: &'a Instrument) -> Self {
         Self { spot: None, ..Self::new(instrument, Dimension::Space) }
     }
