@@ -95,7 +95,8 @@ fn of_picture(
 
 /// What each effect of the scene takes, and by how much the picture is off without it; nothing where it was stopped.
 fn of_effects(folder: &Path, (stage, subject): (&Stage, Material), seed: u64, ui: &Ui) -> Result<(), Failure> {
-    let options = Options { width: SIDE, height: SIDE, samples: SAMPLES[4], seed, ..Options::default() };
+    // Large enough that what an effect takes is not the clock's noise.
+    let options = Options { width: 2 * SIDE, height: 2 * SIDE, samples: SAMPLES[5], seed, ..Options::default() };
     let found = chain::scene_effects(stage, Some(subject), &options, ui.control())?;
     if ui::stop().requested() {
         return Ok(());

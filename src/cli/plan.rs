@@ -41,7 +41,7 @@ pub(super) struct Args {
 }
 
 /// Columns of a parameter.
-const CELL: usize = 15;
+const CELL: usize = 16;
 
 /// Scans that are usual, to compare with.
 const STANDARD: [Scan; 4] = [
@@ -58,14 +58,17 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let instrument = args.instrument.as_deref().map(read_instrument).transpose()?.unwrap_or_default();
     let prior = prior(args)?;
     let budget_s = args.budget.as_secs_f64();
-    let plan = design::plan(&Wish { prior: &prior, instrument: &instrument, budget_s }).map_err(|e| said(&e))?;
+    let planned =
+        |share: f64| design::plan(&Wish { prior: &prior, instrument: &instrument, budget_s: share * budget_s });
+    let plan = planned(1.0).map_err(|e| said(&e))?;
+    let shorter = LESS.map(|share| planned(share).ok().map(|plan| medians(&plan.precision)));
     if plan.undetermined > 0 {
         let (some, all) = (plan.undetermined, plan.draws);
         ui.warn(&format!(
             "at {some} of {all} points of the prior no scan tells the parameters: planned for the others"
         ));
     }
-    let table = Table::new(&prior, &instrument, plan, budget_s / 3600.0);
+    let table = Table::new(&prior, &instrument, (plan, shorter), budget_s / 3600.0);
     write_text(&args.out, &table.scan())?;
     if args.out != Path::new("-") {
         ui.result(&table.text(&args.out), &table.object(&args.out));
@@ -100,9 +103,20 @@ fn parse_time(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "expected a time of more than 0, 2h or 30min say".into())
 }
 
+/// Shares of the budget for which there are plans of their own.
+const LESS: [f64; 2] = [0.25, 0.5];
+
+/// The median error of each parameter.
+fn medians(of: &Precision) -> Vec<f64> {
+    of.errors.iter().map(|e| e[1]).collect()
+}
+
+/// From this relative error on nothing is known of a parameter.
+const OPEN: f64 = 100.0;
+
 /// A relative error in per cent.
 fn percent(e: f64) -> String {
-    if e.is_finite() { significant(100.0 * e) } else { "open".into() }
+    if e < OPEN { significant(100.0 * e) } else { "open".into() }
 }
 
 /// The plan beside the usual scans.
@@ -111,13 +125,20 @@ struct Table {
     /// Name, precision, share of the best information a second.
     scans: Vec<(String, Precision, f64)>,
     plan: Plan,
+    /// Median errors of plans for less than the budget, [`LESS`] of it; nothing where there is none.
+    shorter: [Option<Vec<f64>>; 2],
     budget_h: f64,
     /// Readings of a row as the instrument has them.
     own: u32,
 }
 
 impl Table {
-    fn new(prior: &Prior, instrument: &Instrument, plan: Plan, budget_h: f64) -> Self {
+    fn new(
+        prior: &Prior,
+        instrument: &Instrument,
+        (plan, shorter): (Plan, [Option<Vec<f64>>; 2]),
+        budget_h: f64,
+    ) -> Self {
         let mut scans = vec![("plan".to_owned(), plan.precision.clone())];
         for scan in STANDARD {
             if let Some((directions, _)) = scan.directions() {
@@ -131,7 +152,7 @@ impl Table {
         });
         let scans = scans.collect();
         let names = prior.names().into_iter().map(str::to_owned).collect();
-        Self { names, scans, plan, budget_h, own: instrument.readings }
+        Self { names, scans, plan, shorter, budget_h, own: instrument.readings }
     }
 
     /// What a row stands for where it is more than the instrument's own readings.
@@ -177,40 +198,44 @@ impl Table {
         let parts = self.names.iter().map(|n| n.split_once('.').unwrap_or(("", n)));
         let (lobes, names): (Vec<String>, Vec<String>) = parts.map(|of| (cell(of.0), cell(of.1))).unzip();
         // Writing to a String can't fail.
-        let _ = writeln!(text, "{:36}{}", "", lobes.concat());
-        let _ = writeln!(text, "{:14}{:>6}{:>8}{:>8}{}", "scan", "stops", "hours", "eff., %", names.concat());
+        let _ = writeln!(text, "{:32}{}", "", lobes.concat());
+        let _ = writeln!(text, "{:13}{:>6}{:>6}{:>7}{}", "scan", "stops", "hours", "eff. %", names.concat());
         for (name, of, efficiency) in &self.scans {
             let _ = writeln!(text, "{}", Self::line(name, of, *efficiency));
         }
         let _ = writeln!(text, "as many hours as the plan:");
-        for (name, of, efficiency) in &self.scans[1..] {
+        // A scan that takes longer once can't be read in the plan's hours.
+        for (name, of, efficiency) in self.scans[1..].iter().filter(|(_, of, _)| of.hours <= self.scans[0].1.hours) {
             let _ = writeln!(text, "{}", Self::line(name, &of.in_hours(self.scans[0].1.hours), *efficiency));
         }
         text.push_str(&self.against_hours());
         let below = "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' noise and what they \
-             share: positions and the certificate. Against hours stand the medians alone, the same stops read for so long: a plan made for fewer hours has \
-             fewer stops, and is a little worse. Efficiency: the share of the best information an hour by noise alone.";
+             share: positions and the certificate. Against hours stand the medians alone: of plans made for less than the budget, else of the same stops \
+             read for so long. Efficiency: the share of the best information an hour by noise alone.";
         text.push_str(&wrapped(below, COLUMNS).join("\n"));
         text
     }
 
     /// Hours that precision is shown at: shares and multiples of the budget.
     fn hours(&self) -> [f64; 5] {
-        [0.25, 0.5, 1.0, 2.0, 4.0].map(|times| times * self.budget_h)
+        [LESS[0], LESS[1], 1.0, 2.0, 4.0].map(|times| times * self.budget_h)
     }
 
-    /// Median errors of a scan whose stops are read for so many hours; nothing where that is less than once, but of the plan, which is made for a budget.
-    fn medians(is_plan: bool, of: &Precision, hours: f64) -> Option<Vec<f64>> {
-        (is_plan || hours >= of.hours).then(|| of.in_hours(hours).errors.iter().map(|e| e[1]).collect())
+    /// Median errors of scan number `i` in these hours: of plans for less than the budget their own, else of the same stops read for so long; nothing where that
+    /// is less than once.
+    fn against(&self, i: usize) -> [Option<Vec<f64>>; 5] {
+        let (hours, of) = (self.hours(), &self.scans[i].1);
+        std::array::from_fn(|k| match self.shorter.get(k) {
+            Some(plan) if i == 0 => plan.clone(),
+            _ => (hours[k] >= of.hours).then(|| medians(&of.in_hours(hours[k]))),
+        })
     }
 
     /// Precision against hours, parameter by parameter.
     fn against_hours(&self) -> String {
         let hours = self.hours();
         let cells = |list: [String; 5]| list.map(|cell| format!("{cell:>12}")).concat();
-        let scans = self.scans.iter().enumerate();
-        let medians: Vec<_> =
-            scans.map(|(i, (name, of, _))| (name, hours.map(|h| Self::medians(i == 0, of, h)))).collect();
+        let medians: Vec<_> = self.scans.iter().enumerate().map(|(i, (name, ..))| (name, self.against(i))).collect();
         let of_parameter = |(a, parameter): (usize, &String)| {
             let cell = |errors: &Option<Vec<f64>>| errors.as_ref().map_or("–".into(), |errors| percent(errors[a]));
             let line = |(name, of): &(&String, [_; 5])| format!("  {name:16}{}", cells(of.each_ref().map(cell)));
@@ -227,7 +252,7 @@ impl Table {
         let cells: Vec<String> = of.errors.iter().map(cell).collect();
         let hours = significant(of.hours);
         let share = significant(100.0 * efficiency);
-        format!("{name:14}{:>6}{hours:>8}{share:>8}{}", of.stops, cells.join(""))
+        format!("{name:13}{:>6}{hours:>6}{share:>7}{}", of.stops, cells.join(""))
     }
 
     fn object(&self, out: &Path) -> Value {
@@ -236,15 +261,15 @@ impl Table {
             let one = |(name, e): (&String, &[f64; 3])| json!({ "parameter": name, "relative": e.map(finite) });
             self.names.iter().zip(&of.errors).map(one).collect()
         };
-        let against = |i: usize, of: &Precision| -> Vec<Value> {
-            let median =
-                |h| Self::medians(i == 0, of, h).map(|errors| errors.into_iter().map(finite).collect::<Vec<_>>());
-            self.hours().into_iter().map(|h| json!({ "hours": h, "median": median(h) })).collect()
+        let against = |i: usize| -> Vec<Value> {
+            let median = |errors: Option<Vec<f64>>| errors.map(|e| e.into_iter().map(finite).collect::<Vec<_>>());
+            let points = self.hours().into_iter().zip(self.against(i));
+            points.map(|(hours, errors)| json!({ "hours": hours, "median": median(errors) })).collect()
         };
         let scan = |(i, (name, of, efficiency)): (usize, &(String, Precision, f64))| {
             json!({
                 "scan": name, "stops": of.stops, "readings": of.rows, "hours": of.hours, "efficiency": efficiency,
-                "errors": errors(of), "against_hours": against(i, of),
+                "errors": errors(of), "against_hours": against(i),
             })
         };
         let scans: Vec<Value> = self.scans.iter().enumerate().map(scan).collect();

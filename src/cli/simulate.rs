@@ -131,8 +131,8 @@ struct How {
     seconds: f64,
 }
 
-/// Where readings end later than this times the budget and this many seconds, it is said.
-const LATE: (f64, f64) = (1.1, 0.05);
+/// Where readings end later than the budget by more than this share of it and more than these seconds, it is said.
+const LATE: (f64, f64) = (0.1, 0.05);
 
 /// Reads, with the accuracy and the effects that were asked for.
 fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
@@ -145,7 +145,7 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     let left_out: Vec<&str> = spared.iter().map(|s| s.effect).collect();
     let job = Job { left_out: &left_out, ..job };
     let left = args.time_budget.map(|time| time.saturating_sub(ui.start().elapsed()));
-    let affordable = left.map(|left| job.affordable(left));
+    let affordable = left.map(|left| job.affordable(left, ui.control().stop));
     let accuracy = affordable.map_or(job.accuracy, |a| a.accuracy);
     let raw = Job { accuracy, ..job }.run_until(affordable.map(|a| a.deadline), ui.control());
     let error = raw.quadrature_error;
@@ -161,18 +161,20 @@ impl How {
             let why =
                 if self.affordable.is_some() { "their orders or the time end there" } else { "their orders end there" };
             ui.warn(&format!(
-                "means over cones are good to {:.1e} at worst, not to {:e}: {why}",
+                "means over cones are good to {:.1e} at worst, not to {:.1e}: {why}",
                 self.error, self.accuracy
             ));
         }
-        if let Some(Affordable { predicted_s, .. }) = self.affordable.filter(|a| !a.fits) {
+        let Some(budget_s) = self.budget_s else { return };
+        let late = self.seconds > budget_s + (LATE.0 * budget_s).max(LATE.1);
+        if self.affordable.is_some_and(|a| !a.fits) {
             ui.warn(&format!(
-                "even the lowest orders take {predicted_s:.2} s, and {:.2} s of --time-budget were left for them: all was read with them",
-                self.left_s
+                "--time-budget is too short even for the lowest orders, with which all was read: {:.2} s for {budget_s} s, {:.2} s of them left when trials began",
+                self.seconds, self.left_s
             ));
-        } else if let Some(budget) = self.budget_s.filter(|budget| self.seconds > budget * LATE.0 + LATE.1) {
+        } else if late {
             ui.warn(&format!(
-                "the readings ended at {:.2} s, later than the {budget} s of --time-budget",
+                "the readings ended at {:.2} s, later than the {budget_s} s of --time-budget",
                 self.seconds
             ));
         }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::effects;
 use super::forward::{Job, block_of};
-use crate::control::Control;
+use crate::control::{Control, Stop};
 
 /// Readings that are tried, and those before that make what all readings share: tables of lobes through cones.
 const TRIED: usize = 256;
@@ -72,9 +72,10 @@ impl Deadline {
 }
 
 impl Job<'_> {
-    /// The best accuracy with which all readings fit into `time`, less what the trials took.
+    /// The best accuracy with which all readings fit into `time`, less what the trials took. Once `stop` is requested what it says means nothing.
     #[must_use]
-    pub fn affordable(&self, time: Duration) -> Affordable {
+    pub fn affordable(&self, time: Duration, stop: &Stop) -> Affordable {
+        let quiet = Control { stop, ..Control::silent() };
         let clock = Instant::now();
         let budget = time.as_secs_f64();
         let (readings, actual) = self.prepare();
@@ -83,11 +84,11 @@ impl Job<'_> {
         let first: Vec<_> = some.iter().step_by(some.len().div_ceil(BEFORE).max(1)).copied().collect();
         // Tables that passes share are kept as long as any pass is; what comes of these readings is not wanted.
         let kept = effects::passes(&self.maker(&actual), self.left_out);
-        let _ = Job { accuracy: COARSEST, ..*self }.read(first, &actual, Control::silent());
+        let _ = Job { accuracy: COARSEST, ..*self }.read(first, &actual, quiet);
         let predict = |accuracy: f64| {
             let trial = Job { accuracy, ..*self };
             let start = Instant::now();
-            let read = on_one_thread(|| trial.read(some.clone(), &actual, Control::silent()));
+            let read = on_one_thread(|| trial.read(some.clone(), &actual, quiet));
             let each = start.elapsed().as_secs_f64() / read.readings.len().max(1) as f64;
             each * in_a_row(readings.len())
         };

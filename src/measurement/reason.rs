@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum MaskReason {
     /// Even the shortest exposure saturated the detector.
     Saturated,
-    /// No reading is there.
+    /// No reading is there; of a simulation, nothing is known of the material.
     Unread,
     /// Source and detector stand in each other's light, or may.
     Shadowed,
@@ -44,7 +44,7 @@ impl MaskReason {
     pub fn said(self) -> &'static str {
         match self {
             Self::Saturated => "even the shortest exposure saturated, in one channel at least",
-            Self::Unread => "nothing was read, in one channel at least",
+            Self::Unread => "nothing was read, or the material is not known there, in one channel at least",
             Self::Shadowed => "source and detector shadow each other there, or may",
             Self::Unlit => {
                 "below the horizon, or no light of the beam counts there, or the spot reaches up to source or detector"

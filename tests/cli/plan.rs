@@ -15,14 +15,17 @@ fn a_plan_is_a_scan_that_keeps_its_budget_and_is_measured_as_planned() {
     for (i, scan) in said["scans"].as_array().expect("a list").iter().enumerate() {
         let series = scan["against_hours"].as_array().expect("a list");
         assert_eq!(number(&series[2]["hours"]), 0.1);
-        let is_read = |point: &serde_json::Value| i == 0 || number(&point["hours"]) >= number(&scan["hours"]);
-        assert!(series.iter().all(|point| point["median"].is_array() == is_read(point)), "{scan}");
+        let is_read = |point: &serde_json::Value| number(&point["hours"]) >= number(&scan["hours"]);
+        let shown = if i == 0 { &series[2..] } else { &series[..] };
+        assert!(shown.iter().all(|point| point["median"].is_array() == is_read(point)), "{scan}");
         // Read for as long as it takes once it is as precise as it is.
         let once = series.iter().find(|point| number(&point["hours"]) == number(&scan["hours"]));
         let stated = scan["errors"].as_array().expect("a list").iter().map(|e| &e["relative"][1]);
         assert!(once.is_none_or(|point| stated.eq(point["median"].as_array().expect("a list"))), "{scan}");
         let errors: Vec<f64> = series.iter().filter_map(|p| p["median"][2].as_f64()).collect();
-        assert!(errors.windows(2).all(|e| e[1] <= e[0] * (1.0 + 1e-12)), "{errors:?}");
+        // Plans of their own choose by all parameters together: a longer one may know one of them a little less.
+        let slack = if i == 0 { 1.1 } else { 1.0 + 1e-12 };
+        assert!(errors.windows(2).all(|e| e[1] <= e[0] * slack), "{errors:?}");
     }
     let readings = b.text("scan.csv").lines().filter(|l| !l.starts_with(['#', 't'])).count();
     assert_eq!(number(&plan["readings"]), readings as f64);
@@ -77,8 +80,7 @@ fn the_same_plan_whatever_the_threads_and_a_table_for_people() {
     }
     assert_eq!(b.bytes("1.csv"), b.bytes("2.csv"));
     let text = b.ok(&["plan", "--model", "lambert+phong+phong", "--budget", "1h", "--out", "s.csv"]).text();
-    for says in
-        ["phong[1]", "exponent", "hemisphere:10", "in-plane:5", "as many hours as the plan", "eff., %", "hours "]
+    for says in ["phong[1]", "exponent", "hemisphere:10", "in-plane:5", "as many hours as the plan", "eff. %", "hours "]
     {
         assert!(text.contains(says), "{says}: {text}");
     }

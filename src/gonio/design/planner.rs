@@ -52,8 +52,8 @@ const FIRST: f64 = 0.5;
 /// Most distinct pairs, and the share of the largest weight that each must have.
 const MOST_PAIRS: usize = 60;
 const LEAST_SHARE: f64 = 0.01;
-/// Step of the usual scan that is tried beside, degrees.
-const EVEN_DEG: f64 = 5.0;
+/// Steps of the scan of the plane of incidence that is tried beside, the first that fits into the budget, degrees.
+const EVEN_DEG: [f64; 4] = [5.0, 7.0, 10.0, 15.0];
 
 /// Proposes where to measure. Where a row of the instrument's own readings is so short that the budget pays for more rows than a scan may have, each row
 /// is several times as many readings.
@@ -125,10 +125,12 @@ impl Weighed {
         let (kept, weights) = supported(&self.table, &self.optimum, affordable(wish, self.usual_s));
         let share = |(&x, weight): (&usize, &f64)| Share { weight: *weight, ..self.stops[x] };
         let chosen: Vec<(Pair, Share)> = kept.iter().zip(&weights).map(|of| (self.pairs[*of.0], share(of))).collect();
-        let others = [mirrored(&chosen, wish.instrument), even_grid(wish, self.usual_s, draws)];
+        let mirrored = whole(mirrored(&chosen, wish.instrument), wish);
+        let even = EVEN_DEG.iter().map(|step_deg| whole(even_grid(wish, *step_deg, self.usual_s, draws), wish));
+        let fits = |scan: &Result<Scanned, Wrong>| !matches!(scan, Err(Wrong::Budget { .. }));
         let mut best = whole(chosen, wish)?;
-        for list in others {
-            match whole(list, wish) {
+        for other in std::iter::once(mirrored).chain(even.into_iter().find(fits)) {
+            match other {
                 Ok(other) if other.sureness() > best.sureness() => best = other,
                 Err(wrong @ Wrong::TooMany { .. }) => return Err(wrong),
                 _ => {}
@@ -179,9 +181,9 @@ fn mirrored(list: &[(Pair, Share)], instrument: &Instrument) -> Vec<(Pair, Share
     all
 }
 
-/// The usual scan in the plane of incidence, every pair as often: what shows errors of positions, for it has both sides of every lobe.
-fn even_grid(wish: &Wish<'_>, move_s: f64, draws: &[Vec<f64>]) -> Vec<(Pair, Share)> {
-    let Some((directions, _)) = (Scan::InPlane { step_deg: EVEN_DEG }).directions() else { return Vec::new() };
+/// A usual scan in the plane of incidence, every pair as often: what shows errors of positions, for it has both sides of every lobe.
+fn even_grid(wish: &Wish<'_>, step_deg: f64, move_s: f64, draws: &[Vec<f64>]) -> Vec<(Pair, Share)> {
+    let Some((directions, _)) = (Scan::InPlane { step_deg }).directions() else { return Vec::new() };
     let pairs: Vec<Pair> = (0..directions.len()).map(|i| directions.pair(i)).collect();
     let pairs: Vec<Pair> = pairs.into_iter().filter(|pair| counts(*pair, wish.instrument)).collect();
     let (stops, _) = tell(wish.prior, wish.instrument, move_s, &pairs, draws);
@@ -258,6 +260,9 @@ fn tell(
     (stops, Table { parameters: p, draws: told })
 }
 
+/// ln of the largest ratio of noise to jitter that makes stops longer.
+const LONGEST_LN: f64 = 50.0;
+
 /// How many rows a stop is best read: longer where noise is large against jitter and moves are dear. A stop costs move + k dwell and leaves
 /// jitter + noise/k: their product is least at k² = move noise/(dwell jitter).
 fn length(instrument: &Instrument, move_s: f64, variances: impl Iterator<Item = (f64, f64)>) -> Share {
@@ -271,7 +276,8 @@ fn length(instrument: &Instrument, move_s: f64, variances: impl Iterator<Item = 
     if count == 0 {
         return Share { weight: 0.0, row_s, rows_per_stop: block };
     }
-    let ratio = (sum / f64::from(count)).exp();
+    // Of hardly any jitter the ratio has no end.
+    let ratio = (sum / f64::from(count)).min(LONGEST_LN).exp();
     let best = (move_s * ratio / row_s).sqrt().round();
     let rows_per_stop = best.clamp(1.0, f64::from(block)) as u32;
     Share { weight: 0.0, row_s: row_s + move_s / f64::from(rows_per_stop), rows_per_stop }

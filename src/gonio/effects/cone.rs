@@ -140,10 +140,13 @@ impl Cones {
         let (mut change, mut earlier) = (f64::INFINITY, f64::INFINITY);
         for level in first..=end {
             self.sum(level, &about, f, out);
+            if out.iter().any(|mean| mean.is_nan()) {
+                return 0.0; // not known somewhere within the cones: no order tells it
+            }
             if level > first {
                 earlier = LEFT * change;
-                change = out.iter().zip(&before).map(|(new, old)| moved(*new, *old)).fold(0.0, f64::max);
-                if change.is_nan() || change <= self.accuracy && (!kinked || earlier <= self.accuracy) {
+                change = largest_move(out, &before);
+                if change <= self.accuracy && (!kinked || earlier <= self.accuracy) {
                     break;
                 }
             }
@@ -180,7 +183,7 @@ impl Cones {
     }
 
     /// Half width (rad), within a factor of two, of a peak about the mirror direction that is within `reach` and that low orders might miss between
-    /// their directions. Nothing is known of other peaks.
+    /// their directions. Nothing is known of other peaks, and of none where `f` is not known at the foot, on top or between.
     pub fn peak(
         &self,
         wi: DVec3,
@@ -203,11 +206,16 @@ impl Cones {
         let mut at = |angle: f64| {
             scratch.fill(0.0);
             f(wi, top * angle.cos() + across * angle.sin(), 1.0, scratch);
-            scratch.iter().copied().fold(0.0, f64::max)
+            scratch.iter().copied().fold(0.0, largest)
         };
         let (foot, peak) = (at(reach), at(0.0));
         let half = 0.5 * (foot + peak);
-        (peak > foot).then(|| (1..=40).map(|k| reach * 0.5f64.powi(k)).find(|angle| at(*angle) >= half)).flatten()
+        if peak.is_nan() || peak <= foot {
+            return None;
+        }
+        let known = (1..=40).map(|k| reach * 0.5f64.powi(k)).map(|angle| (angle, at(angle)));
+        let mut known = known.take_while(|(_, value)| !value.is_nan());
+        known.find(|(_, value)| *value >= half).map(|(angle, _)| angle)
     }
 
     /// The level whose outer directions are no farther apart than three half widths, so that doubling shows what is missing.
@@ -217,8 +225,18 @@ impl Cones {
     }
 }
 
+/// The larger number; not a number where one is none, which `f64::max` passes over.
+fn largest(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b <= a { a } else { b }
+}
+
+/// The largest relative change between values of two rules.
+pub(super) fn largest_move(new: &[f64], old: &[f64]) -> f64 {
+    new.iter().zip(old).map(|(new, old)| moved(*new, *old)).fold(0.0, largest)
+}
+
 /// Relative change between two values.
-pub(super) fn moved(new: f64, old: f64) -> f64 {
+fn moved(new: f64, old: f64) -> f64 {
     if new == old { 0.0 } else { (new - old).abs() / new.abs().max(old.abs()) }
 }
 

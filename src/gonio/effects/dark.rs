@@ -5,7 +5,7 @@
 //!
 //! Realistic: d from 5e-4 (a cooled CCD: 2 electrons an hour and pixel, Keck's ESI) to 1e10; Hamamatsu's photodiode
 //! S1133 has 10 pA at most at 1 V, 6e7; Thorlabs' FDS100 typically 1 nA at 20 V, 6e9. The drift is mostly the
-//! temperature's, 1 to 10 % of d in an hour (typical): S1133's current grows 1.12-fold a degree.
+//! temperature's, 1 to 50 % of d in an hour (typical): S1133's current grows 1.12-fold a degree.
 
 use super::{Block, Entry, Maker, Pass};
 

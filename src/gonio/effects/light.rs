@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::cone::{Cones, moved};
+use super::cone::{Cones, largest_move};
 use super::{Block, Maker, Pass};
 use crate::brdf::{LobeTerm, Material};
 use crate::control::Stop;
@@ -222,6 +222,9 @@ impl Spread<'_> {
             out.fill(0.0);
             off.fill(0.0);
             spot.points(pair, order, |point| {
+                if self.stop.requested() {
+                    return;
+                }
                 let error = self.at_point(kind, (point.wi, point.wo), &how, &mut evaluations, &mut of_point);
                 for (c, value) in of_point.iter().enumerate() {
                     out[c] += point.weight * value;
@@ -230,9 +233,12 @@ impl Spread<'_> {
             });
             let inner = off.iter().zip(&*out).map(|(off, value)| share(*off, *value)).fold(0.0, f64::max);
             if order > first {
-                change = out.iter().zip(&before).map(|(new, old)| moved(*new, *old)).fold(0.0, f64::max);
+                change = largest_move(out, &before);
             }
-            let is_good = change.is_nan() || change <= self.accuracy || late.is_some() && order > first;
+            if out.iter().any(|mean| mean.is_nan()) || self.stop.requested() {
+                return 0.0; // not known at a point of the spot, or not wanted any more
+            }
+            let is_good = change <= self.accuracy || late.is_some() && order > first;
             if is_good || 2 * order > FINEST || order > first && 5 * evaluations > MANY {
                 break inner;
             }
@@ -264,6 +270,10 @@ impl Pass for Spread<'_> {
                     Some(spot) => self.over(spot, kind, pair, late, &mut out),
                     None => self.at_point(kind, pair, &How { late, is_part: false }, &mut 0, &mut out),
                 };
+                if self.stop.requested() {
+                    block.done = i;
+                    return;
+                }
                 block.error = block.error.max(error);
                 last = Some((kind, pair));
             }

@@ -2,7 +2,7 @@
 //!
 //! P(t) = P(0) (1 + w(t)), σ of w(t) = `source.drift_per_sqrt_hour`·√(t/1 h), relative; stray light drifts with it.
 //!
-//! Realistic: 1e-4 to 0.03. An LED under optical feedback drifts by 0.007 % an hour (doi 10.1371/journal.pone.0029822);
+//! Realistic: 5e-5 to 0.03. An LED under optical feedback drifts by 0.007 % an hour (doi 10.1371/journal.pone.0029822);
 //! the source's instability is 0.23 % of a budget (doi 10.2478/msr-2025-0044); a stabilised dc arc stays within 1 %
 //! ("Optical output stabilization method for direct current arc lamps", Rev. Sci. Instrum.). A halogen lamp's flux goes
 //! as its current's 6.5th power (SPIE Field Guide to Illumination, 2007): 0.3 % of current are 2 %.

@@ -35,7 +35,10 @@ struct Quantisation {
 
 impl Pass for Quantisation {
     fn apply(&self, block: &mut Block<'_>) {
-        // The offset of real converters keeps noise about 0: negative signals are rounded too.
-        block.signal.iter_mut().for_each(|s| *s = (self.step * (*s / self.step).round()).min(self.most));
+        // The offset of real converters keeps noise about 0: negative signals are rounded too. What is no number stays none, which `min` would not leave.
+        for signal in &mut block.signal {
+            let rounded = self.step * (*signal / self.step).round();
+            *signal = if rounded > self.most { self.most } else { rounded };
+        }
     }
 }

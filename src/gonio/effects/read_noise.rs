@@ -2,7 +2,7 @@
 //!
 //! It is the same for any exposure and signal; EMVA 1288 has it in the variance of the dark noise.
 //!
-//! Realistic: 2 to 30 electrons for a cooled CCD (2.7: Keck's ESI; 27 measured of a KAF-0400, TASS note 18), 1e3 to 1e6
+//! Realistic: 2 to 30 electrons for a cooled CCD (2.7: Keck's ESI; 27 measured of a KAF-0400, TASS note 18), 100 to 1e6
 //! for a photodiode and its amplifier: the lowest noise at room temperature was 0.1 fA over 400 s, which is 2.5e5
 //! electrons (Eppeldauer and Hardis, "Fourteen-decade photocurrent measurements", Applied Optics 30, 1991).
 

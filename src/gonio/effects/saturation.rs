@@ -4,7 +4,7 @@
 //! in: the longest that does not saturate counts.
 //!
 //! Realistic: 4e4 to 5e5 for a CCD's pixel (Spectral Instruments' Series 800 manual; 1.05e5: Keck's ESI), 1e7 to 1e10
-//! for an integrating amplifier (typical: 10 pF at 10 V are 6e8). Two or three exposures, 10 to 100 apart, span the 10⁶
+//! for an integrating amplifier (typical: 10 pF at 10 V are 6e8). Two or three exposures, 10 to 1000 apart, span the 10⁶
 //! to 10⁷ of signals that coloured samples need (NIST's five-axis goniospectrometer; Podobedov, Nadal and Miller).
 
 use super::{Block, Entry, Maker, Pass, stated};
