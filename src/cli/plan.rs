@@ -41,7 +41,7 @@ pub(super) struct Args {
 }
 
 /// Columns of a parameter.
-const CELL: usize = 16;
+const CELL: usize = 15;
 
 /// Scans that are usual, to compare with.
 const STANDARD: [Scan; 4] = [
@@ -117,6 +117,15 @@ const OPEN: f64 = 100.0;
 /// A relative error in per cent.
 fn percent(e: f64) -> String {
     if e < OPEN { significant(100.0 * e) } else { "open".into() }
+}
+
+/// The same in two digits.
+fn brief(e: f64) -> String {
+    if e >= OPEN {
+        return percent(e);
+    }
+    let digits = (1 - (100.0 * e).log10().floor().max(-12.0) as i32).max(0) as usize;
+    format!("{:.digits$}", 100.0 * e)
 }
 
 /// The plan beside the usual scans.
@@ -198,8 +207,8 @@ impl Table {
         let parts = self.names.iter().map(|n| n.split_once('.').unwrap_or(("", n)));
         let (lobes, names): (Vec<String>, Vec<String>) = parts.map(|of| (cell(of.0), cell(of.1))).unzip();
         // Writing to a String can't fail.
-        let _ = writeln!(text, "{:32}{}", "", lobes.concat());
-        let _ = writeln!(text, "{:13}{:>6}{:>6}{:>7}{}", "scan", "stops", "hours", "eff. %", names.concat());
+        let _ = writeln!(text, "{:35}{}", "", lobes.concat());
+        let _ = writeln!(text, "{:13}{:>7}{:>8}{:>7}{}", "scan", "stops", "hours", "eff. %", names.concat());
         for (name, of, efficiency) in &self.scans {
             let _ = writeln!(text, "{}", Self::line(name, of, *efficiency));
         }
@@ -248,11 +257,11 @@ impl Table {
 
     /// One scan.
     fn line(name: &str, of: &Precision, efficiency: f64) -> String {
-        let cell = |e: &[f64; 3]| format!("{:>CELL$}", format!("{} ({})", percent(e[1]), percent(e[2])));
+        let cell = |e: &[f64; 3]| format!("{:>CELL$}", format!("{} ({})", percent(e[1]), brief(e[2])));
         let cells: Vec<String> = of.errors.iter().map(cell).collect();
         let hours = significant(of.hours);
         let share = significant(100.0 * efficiency);
-        format!("{name:13}{:>6}{hours:>6}{share:>7}{}", of.stops, cells.join(""))
+        format!("{name:13}{:>7}{hours:>8}{share:>7}{}", of.stops, cells.join(""))
     }
 
     fn object(&self, out: &Path) -> Value {

@@ -210,7 +210,8 @@ impl Cones {
         };
         let (foot, peak) = (at(reach), at(0.0));
         let half = 0.5 * (foot + peak);
-        if peak.is_nan() || peak <= foot {
+        // Without one that is lower than the error that a mean may have nothing is missed.
+        if peak.is_nan() || peak - foot <= self.accuracy * peak {
             return None;
         }
         let known = (1..=40).map(|k| reach * 0.5f64.powi(k)).map(|angle| (angle, at(angle)));

@@ -211,7 +211,7 @@ impl Spread<'_> {
         let mut add = |wi: DVec3, wo: DVec3, weight: f64, out: &mut [f64]| {
             self.light.add(kind, (wi, wo), weight, &mut f, out);
         };
-        let peak = self.cones.peak(pair.0, pair.1, smear + self.cones.reach(), &mut add, out);
+        let peak = late.unwrap_or(&self.cones).peak(pair.0, pair.1, smear + self.cones.reach(), &mut add, out);
         let needed = peak.map_or(1, |width| Spot::order_for(smear, width));
         let [mut before, mut of_point, mut off] = [(); 3].map(|()| vec![0.0; out.len()]);
         let how = How { late, is_part: true };
