@@ -169,7 +169,7 @@ impl How {
         let late = self.seconds > budget_s + (LATE.0 * budget_s).max(LATE.1);
         if self.affordable.is_some_and(|a| !a.fits) {
             ui.warn(&format!(
-                "--time-budget is too short even for the lowest orders, with which all was read: {:.2} s for {budget_s} s, {:.2} s of them left when trials began",
+                "even the lowest orders, with which all was read, take longer than --time-budget: the readings ended at {:.2} s, {:.2} s were left when trials began",
                 self.seconds, self.left_s
             ));
         } else if late {
