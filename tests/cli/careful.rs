@@ -68,7 +68,7 @@ fn means_over_cones_that_are_worse_than_asked_for_are_always_warned_of() {
     b.write("cone.toml", "version = 1\n[instrument.detector]\naperture_deg = 4\n");
     // A narrower lobe than any sum over directions meets is known by its tables, to 3e-9.
     for (n, error, said) in [
-        ("1e8", "1e-10", "means over cones are good to 3.0e-9 at worst, not to 1e-10"),
+        ("1e8", "1e-10", "means over cones are good to 3.0e-9 at worst, not to 1.0e-10"),
         ("1e8", "1e-6", ""),
         ("90", "1e-6", ""),
     ] {
