@@ -2,17 +2,16 @@
 
 use std::path::Path;
 
-use serde_json::Value;
-
 use super::effects::of_scene;
 use super::failure::Failure;
-use super::output::{make_folder, write_text};
+use super::output::{make_folder, write_json};
 use super::ui::{self, Ui};
 use crate::brdf::ModelSpec;
 use crate::chain::{self, Demo, Source, Stage};
 use crate::fit::{FitOptions, Loss};
 use crate::measurement::{ReadOptions, formats};
 use crate::render::{Material, Options};
+use crate::report::run::{EFFECTS, SWEEP};
 use crate::tradeoff::fit::FitSweep;
 use crate::tradeoff::render::{RenderSweep, Way};
 use crate::tradeoff::{Effort, Sweep, fit, render};
@@ -26,17 +25,15 @@ const SIDE: u32 = 64;
 const SAMPLES: [u32; 6] = [4, 8, 16, 32, 64, 128];
 /// Shares by which a fit's rmse may exceed the least one.
 const TARGETS: [f64; 3] = [0.1, 0.01, 0.001];
-/// What is written, in folders of their own and in the run's.
+/// The curves' folders in the run's.
 const OF_FIT: &str = "accuracy-fit";
 const OF_PICTURE: &str = "accuracy-render";
-const CURVE: &str = "tradeoff.json";
-const EFFECTS: &str = "effects.json";
 
 /// Measures a demo's and writes them where its report looks for them. What can't be measured, and what was stopped, is said and left out: the run is
 /// whole without.
 pub(super) fn of_demo(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) {
     // An earlier run's are not this one's.
-    for old in [folder.join(OF_FIT).join(CURVE), folder.join(OF_PICTURE).join(CURVE), folder.join(EFFECTS)] {
+    for old in [folder.join(OF_FIT).join(SWEEP), folder.join(OF_PICTURE).join(SWEEP), folder.join(EFFECTS)] {
         let _ = std::fs::remove_file(old);
     }
     let measured = measure(folder, demo, seed, ui);
@@ -102,7 +99,7 @@ fn of_effects(folder: &Path, (stage, subject): (&Stage, Material), seed: u64, ui
         return Ok(());
     }
     let object = of_scene::object(&stage.spec.name, &options, &found);
-    write_text(&folder.join(EFFECTS), &pretty(&object)?)
+    write_json(&folder.join(EFFECTS), &object)
 }
 
 /// Writes a curve into a folder of its own; nothing where no trial was over before the work was stopped.
@@ -112,9 +109,5 @@ fn write(folder: &Path, sweep: &Sweep) -> Result<(), Failure> {
     }
     make_folder("--out", folder)?;
     let object = serde_json::to_value(sweep).map_err(|e| Failure::work(e.to_string()))?;
-    write_text(&folder.join(CURVE), &pretty(&object)?)
-}
-
-fn pretty(object: &Value) -> Result<String, Failure> {
-    serde_json::to_string_pretty(object).map(|text| text + "\n").map_err(|e| Failure::work(e.to_string()))
+    write_json(&folder.join(SWEEP), &object)
 }

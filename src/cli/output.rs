@@ -3,6 +3,8 @@
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use super::failure::Failure;
 use super::ui::Ui;
 use crate::control::write_whole;
@@ -58,6 +60,12 @@ fn not_utf8(name: &str, place: usize, bytes: &[u8]) -> Failure {
 /// Writes a text file whole, or to stdout for `-` (where a closed pipe is no error).
 pub(super) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_bytes(path, text.as_bytes())
+}
+
+/// Writes an object as a JSON file for people and programs, whole.
+pub(super) fn write_json(path: &Path, object: &Value) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(object).map_err(|e| Failure::work(e.to_string()))?;
+    write_text(path, &(text + "\n"))
 }
 
 /// Writes a file whole, or to stdout for `-`.

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::comparison::sentence;
 use super::failure::Failure;
 use super::info::Reading;
-use super::output::{keeps_inputs, make_folder, write_text};
+use super::output::{keeps_inputs, make_folder, write_json};
 use super::render::{PictureArgs, parse_exposure};
 use super::report;
 use super::ui::{self, Ui};
@@ -89,8 +89,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         "fits": rows.iter().enumerate().map(numbers).collect::<Vec<_>>(), "out": args.out, "stopped": stopped,
         "run": report::made(),
     });
-    let numbers = serde_json::to_string_pretty(&object).map_err(|e| Failure::work(e.to_string()))?;
-    write_text(&args.out.join("numbers.json"), &(numbers + "\n"))?;
+    write_json(&args.out.join("numbers.json"), &object)?;
     if args.report {
         let options = RunOptions { measurement: Some(args.measurement.clone()), reading: args.reading.options() };
         report::of_folder(&args.out, &options)?;

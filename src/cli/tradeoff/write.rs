@@ -5,21 +5,21 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::cli::failure::Failure;
-use crate::cli::output::{write_bytes, write_text};
+use crate::cli::output::{write_bytes, write_json, write_text};
+use crate::report::run::SWEEP;
 use crate::report::views;
 use crate::tradeoff::{Sweep, to_csv};
 
+/// The trials' numbers, a row a setting.
+const TABLE: &str = "tradeoff.csv";
 /// Width of the PNG plots, pixels.
 const PIXELS: u32 = 1200;
 
 /// Writes everything, and returns the files' names.
 pub(super) fn all(folder: &Path, sweep: &Sweep, object: &Value) -> Result<Vec<String>, Failure> {
-    let json = serde_json::to_string_pretty(object).map_err(|e| Failure::work(e.to_string()))? + "\n";
-    let files = [("tradeoff.csv", to_csv(sweep)), ("tradeoff.json", json)];
-    for (name, text) in &files {
-        write_text(&folder.join(name), text)?;
-    }
-    let mut names = files.map(|(name, _)| name.to_owned()).to_vec();
+    write_text(&folder.join(TABLE), &to_csv(sweep))?;
+    write_json(&folder.join(SWEEP), object)?;
+    let mut names = vec![TABLE.to_owned(), SWEEP.to_owned()];
     let drawn: views::Sweep = serde_json::from_value(object.clone()).map_err(|e| Failure::work(e.to_string()))?;
     for plot in drawn.plots() {
         let png = plot.figure.to_png(PIXELS).map_err(|e| Failure::work(format!("{}: {e}", plot.name)))?;

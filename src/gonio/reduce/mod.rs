@@ -300,9 +300,9 @@ struct Reduced {
 
 /// What to tell of the pairs that are masked.
 fn notes_of(reasons: &[Option<MaskReason>]) -> Vec<String> {
-    let note = |(reason, count): (MaskReason, usize)| match count {
-        1 => format!("1 pair of directions is masked: {}", reason.said()),
-        _ => format!("{count} pairs of directions are masked: {}", reason.said()),
+    let note = |(reason, count): (MaskReason, usize)| {
+        let are = if count == 1 { "is" } else { "are" };
+        format!("{} of directions {are} masked: {}", counted(count as u64, "pair"), reason.said())
     };
     reason::counts(reasons).into_iter().map(note).collect()
 }

@@ -235,9 +235,10 @@ impl Run {
     }
 }
 
-/// What `goniofit effects` and `tradeoff` wrote.
-const EFFECTS: &str = "effects.json";
-const SWEEP: &str = "tradeoff.json";
+/// What `goniofit effects` wrote.
+pub const EFFECTS: &str = "effects.json";
+/// What `goniofit tradeoff` wrote.
+pub const SWEEP: &str = "tradeoff.json";
 
 /// The note on a file of the folder that is no part of the report.
 fn left_out(reason: &str) -> String {

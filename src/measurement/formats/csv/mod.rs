@@ -3,7 +3,8 @@
 //! Columns stand in any order: `theta_i_deg`, `phi_i_deg`, `theta_o_deg`, `phi_o_deg`; one per channel, under any other name, in 1/sr; `sigma_<channel>`
 //! (≥ 0, 0 is exact), for every channel or none; `common_<k>_<channel>` (1 σ, signed; k in plain digits), component by component
 //! for every channel; `row_<channel>` (1 σ, signed, no more than the row's `sigma_<channel>`), the part of σ that the channels of a row share;
-//! `weight` (≥ 0); `mask_reason` (`saturated`, `unread`, `shadowed`, `unlit`, or nothing), why a row has no value. An empty value is masked as not measured, `nan` and `inf` as not finite. Comments that mean something:
+//! `weight` (≥ 0); `mask_reason` (`saturated`, `unread`, `shadowed`, `unlit`, or nothing), why a row has no value. An empty value is masked as not
+//! measured, `nan` and `inf` as not finite. Comments that mean something:
 //!
 //! - `# quantity: brdf` (default) or `brdf_cos`;
 //! - `# dimension: 2`: the flat world, columns `theta_i_deg` and `theta_o_deg` in [−90, 90], values in 1/rad, masked at ±90, where the
