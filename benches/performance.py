@@ -31,7 +31,7 @@ TEMPLATE = HERE / "performance.md"
 PAGE = ROOT / "docs" / "performance.md"
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 GONIOFIT = TARGET / "release" / "goniofit"
-BUSY = 0.25  # load average per CPU before a measurement, from which on it says that the machine was busy
+BUSY = 0.35  # load average per CPU before a measurement, from which on it says that the machine was busy
 WIDTH = 160  # of the page's lines
 ROUNDS = 5  # of a whole process: the quickest counts
 
