@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use goniofit::control::Control;
 use goniofit::render::scene::builtin;
-use goniofit::render::{Film, Materials, Options, Plan, Scene, render};
+use goniofit::render::{Film, Materials, Options, Plan, Scene, SceneSpec, render};
 
 const SIDE: u32 = 64;
 
@@ -96,17 +96,34 @@ fn deadlines(trials: u64) {
     }
 }
 
-/// 256 samples a pixel by the plan of the scene, without closed forms, and by the full integrator: rays, time, the error that the picture states, and the
-/// time after which it would be 1 %.
+/// A glossy ball under a quad that nothing can hide.
+fn lone(n: f64) -> Scene {
+    let text = format!(
+        "version = 1\nname = \"lone\"\nmax_bounces = 4\n[camera]\nposition = [0, 1, 4]\ntarget = [0, 0, 0]\nfov_deg = 35\n[materials]\n\
+         a = {{ kd = [0.2, 0.2, 0.2], phong = [{{ ks = [0.4, 0.4, 0.4], n = {n} }}] }}\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"a\"\n\
+         [[light.quad]]\ncenter = [1.2, 1.8, 1.6]\nu = [1, 0, 0]\nv = [0, -0.4, 0.9]\nradiance = [10, 10, 10]\n"
+    );
+    let spec = SceneSpec::parse(&text, "lone").expect("a scene");
+    Scene::build(&spec, Path::new("."), &Materials::new()).expect("builds")
+}
+
+/// 256 samples a pixel by the plan of the scene, without closed forms, one path at a time, and by the full integrator: rays, time, the error that the picture
+/// states, and the time after which it would be 1 %.
 fn plans() {
     println!("| scene | plan | rays a sample | time | relative error | time to 1 % |\n|---|---|---|---|---|---|");
-    for name in ["sphere", "furnace", "sphere-on-plane", "cornell", "preview", "mesh-env"] {
-        let scene = built(name);
+    let named =
+        ["sphere", "furnace", "sphere-on-plane", "cornell", "preview", "mesh-env"].map(|n| (n.to_owned(), built(n)));
+    let balls = [2.0, 20.0, 200.0, 1000.0].map(|n| (format!("ball, n = {n}"), lone(n)));
+    for (name, scene) in named.into_iter().chain(balls) {
         let derived = Plan::of(&scene);
+        let sampled = Plan { closed_forms: false, chance: true, ..derived };
         let one_by_one = Plan { packets: false, closed_forms: false, chance: true, ..derived };
-        for (words, plan) in
-            [("of the scene", derived), ("the same, one path at a time", one_by_one), ("everything", Plan::FULL)]
-        {
+        let mut ways = vec![("of the scene", derived)];
+        if derived.closed_forms {
+            ways.push(("the same, without closed forms", sampled));
+        }
+        ways.extend([("the same, one path at a time", one_by_one), ("everything", Plan::FULL)]);
+        for (words, plan) in ways {
             let film = picture(&scene, Options { samples: 256, plan: Some(plan), ..Options::default() });
             let error = film.error().expect("samples enough").relative;
             let rays = film.rays as f64 / film.total_samples() as f64;

@@ -2,7 +2,7 @@
 
 use super::lights::Environment;
 use super::material::Material;
-use super::packet::FlatScene;
+use super::packet::{FlatScene, MOST_CLOSED};
 use super::scene::Scene;
 use crate::control::{self, counted};
 
@@ -16,7 +16,7 @@ pub struct Plan {
     pub interreflection: bool,
     /// Rays may run into lights or the environment whose light is not known otherwise.
     pub chance: bool,
-    /// Light that nothing can hide is integrated in closed form, where there is one.
+    /// Light that nothing can hide is integrated in closed form, where there is one. Without them, `chance` must be on where lights have a surface.
     pub closed_forms: bool,
     /// Paths are followed side by side, on the vector units.
     pub packets: bool,
@@ -134,8 +134,11 @@ fn why_closed_forms(scene: &Scene, flat: Option<&FlatScene<'_>>) -> String {
     match flat.map_or((0, false), |f| (f.closed_lights(), f.closed_environment())) {
         (0, true) => "one convex body in an even environment shows its directional albedo".into(),
         (0, false) if !scene.rays_find_light() => "there is no light to integrate over".into(),
-        (0, false) => "lights may be hidden in part".into(),
-        (n, _) => format!("nothing can hide {}: no samples of it on diffuse surfaces", counted(n as u64, "quad light")),
+        (0, false) => "lights may be hidden in part, or lobes are sharp".into(),
+        (n, _) => format!(
+            "nothing can hide {}: no samples of it but of materials with lobes sharper than n = {MOST_CLOSED}",
+            counted(n as u64, "quad light")
+        ),
     }
 }
 

@@ -6,14 +6,16 @@ use super::super::lights::{Environment, Light, QuadLight};
 use super::super::material::Material;
 use super::super::scene::Scene;
 use super::super::shapes::{Owner, Sphere};
-use super::closed::Surround;
 use super::occluders::{Extent, Occluders};
+use super::surround::Surround;
 
 /// Shapes and materials that a scene may have: every ray asks all of them.
 const MOST_SHAPES: usize = 48;
 const MOST_MATERIALS: usize = 16;
 /// Phong lobes of one material.
 pub(super) const MOST_LOBES: usize = 3;
+/// Up to this exponent a Phong lobe's light of a quad that nothing can hide is integrated: sharper lobes find it more cheaply by their own samples.
+pub(in crate::render) const MOST_CLOSED: f64 = 1000.0;
 
 /// A plane, or the piece of it with |a|, |b| ≤ 1 where the coordinates of p are `to_a`·(p − point), `to_b`·(p − point).
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +42,13 @@ pub(super) struct Lobes {
     pub black: bool,
 }
 
+impl Lobes {
+    /// Whether what it reflects of a quad that nothing hides has a closed form, for each of its lobes.
+    pub fn is_closed(&self) -> bool {
+        self.phong.iter().all(|(_, n, _)| *n <= MOST_CLOSED)
+    }
+}
+
 /// The scene.
 #[derive(Debug)]
 pub(in crate::render) struct FlatScene<'a> {
@@ -53,7 +62,7 @@ pub(in crate::render) struct FlatScene<'a> {
     /// What may hide the environment.
     pub(super) before_environment: Occluders,
     pub(super) max_bounces: u32,
-    /// Which lights nothing can hide, so that what they shine on a diffuse surface has a closed form.
+    /// Which quads nothing can hide, so that what most materials reflect of them has a closed form.
     pub(super) closed: Vec<bool>,
     /// How many of the shapes reflect.
     surfaces: usize,
@@ -132,9 +141,16 @@ impl<'a> FlatScene<'a> {
         self.before_lights.iter().any(hides) || self.environment.is_some() && hides(&self.before_environment)
     }
 
-    /// Number of lights whose light on diffuse surfaces has a closed form.
+    /// Number of quads that nothing can hide, where what a surface reflects of them has a closed form.
     pub fn closed_lights(&self) -> usize {
-        self.closed.iter().filter(|closed| **closed).count()
+        let some = self.used().any(|material| !material.black && material.is_closed());
+        if some { self.closed.iter().filter(|closed| **closed).count() } else { 0 }
+    }
+
+    /// Materials of shapes.
+    fn used(&self) -> impl Iterator<Item = &Lobes> {
+        let owners = self.spheres.iter().map(|s| s.1).chain(self.pieces.iter().map(|p| p.1));
+        owners.filter(|owner| *owner >= 0.0).filter_map(|owner| self.materials.get(owner as usize))
     }
 
     /// Whether what the environment sends has a closed form: it is even, and there is nothing but one body.
@@ -144,7 +160,8 @@ impl<'a> FlatScene<'a> {
 
     /// Whether rays must look for light that no closed form gives.
     pub fn must_find_light(&self) -> bool {
-        let open = self.shining().any(|(k, _)| self.lobes > 0 || !self.closed[k]);
+        let sampled = !self.used().all(Lobes::is_closed);
+        let open = self.shining().any(|(k, _)| sampled || !self.closed[k]);
         open || self.environment.is_some() && !self.closed_environment()
     }
 

@@ -155,3 +155,74 @@ fn area_spread<S: Simd>(light: &QuadLight, from: Vec3<S>, to: Vec3<S>) -> Lanes<
     let distance2 = d.length_squared();
     d.dot(d.vector(quad.normal)).abs() * distance2.number(quad.area) / (distance2 * distance2.sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::numeric::lanes::LANES;
+    use crate::numeric::random::{Purpose, RngExt, stream};
+    use crate::numeric::simd::{Kernel, vectorised};
+    use crate::render::ray::SurfacePoint;
+    use crate::render::shapes::Quad;
+
+    /// Light of a quad at a point, by a point of the unit square: whether there is any, its direction and 1/density.
+    struct Arrives<'a>(&'a QuadLight, &'a SurfacePoint, DVec2);
+
+    impl Kernel for Arrives<'_> {
+        type Output = (bool, DVec3, f64, f64);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let at = Points3 {
+                position: Vec3::splat(simd, self.1.position),
+                error: Vec3::splat(simd, self.1.error),
+                normal: Vec3::splat(simd, self.1.normal),
+            };
+            let u = (Lanes::splat(simd, self.2.x), Lanes::splat(simd, self.2.y));
+            let found = from_quad(self.0, &at, u);
+            let first = |lanes: Lanes<S>| {
+                let mut all = [0.0; LANES];
+                lanes.store(&mut all);
+                all[0]
+            };
+            let d = found.shadow.direction;
+            let direction = DVec3::new(first(d.x), first(d.y), first(d.z));
+            let target = at.position + d * found.shadow.t_max;
+            (found.some.any(), direction, first(found.spread), first(quad_spread(self.0, at.position, target)))
+        }
+    }
+
+    /// Packets aim at the same points of a quad with the same densities as one path does: close to it, over an edge, behind it, far away, and where it is no
+    /// rectangle.
+    #[test]
+    fn packets_aim_at_quads_as_single_paths_do() {
+        let mut rng = stream(6, Purpose::Study, 0);
+        let (mut lit, mut dark) = (0, 0);
+        for case in 0..4000 {
+            let mut point = || DVec3::new(rng.random(), rng.random(), rng.random()) - 0.5;
+            let (u, skew, normal) = (point(), point(), point().normalize());
+            let v = if case % 4 == 0 { skew } else { u.cross(skew) };
+            let quad = Quad::new(point(), u, v);
+            let light = QuadLight::new(quad, DVec3::ONE);
+            let distance = [1e-3, 0.1, 1.0, 30.0][case / 4 % 4];
+            let foot = quad.center + 3.0 * rng.random::<f64>() * quad.u + 1.2 * rng.random::<f64>() * quad.v;
+            let position = foot + if case % 7 == 0 { -distance } else { distance } * quad.normal;
+            let at = SurfacePoint { position, error: DVec3::splat(1e-15), normal };
+            let u = DVec2::new(rng.random(), rng.random());
+            let (some, direction, spread, again) = vectorised(Arrives(&light, &at, u));
+            let Some(want) = light.sample(&at, u) else {
+                assert!(!some, "case {case}: behind it");
+                dark += 1;
+                continue;
+            };
+            lit += 1;
+            let pdf = want.pdf.expect("it has a surface");
+            assert!(some && (direction - want.wi).length() < 1e-8, "case {case}: {direction} vs {}", want.wi);
+            assert!((spread * pdf - 1.0).abs() < 1e-7, "case {case}: {spread} vs {}", 1.0 / pdf);
+            assert!((again / spread - 1.0).abs() < 1e-6, "case {case}: {again} vs {spread}");
+        }
+        assert!(lit > 3000 && dark > 400, "{lit} lit, {dark} dark");
+    }
+}

@@ -24,6 +24,8 @@ pub(super) struct LobesAt<S: Simd> {
     pub black: Mask<S>,
     /// Where there are no Phong lobes.
     pub plain: Mask<S>,
+    /// Where light of quads that nothing can hide has a closed form.
+    pub closed: Mask<S>,
 }
 
 /// Axes of the local frame.
@@ -73,6 +75,7 @@ impl FlatScene<'_> {
             count: self.lobes,
             black: zero.above(zero),
             plain: one.above(zero),
+            closed: one.above(zero),
         };
         for (m, material) in self.materials.iter().enumerate() {
             let here = owner.is(zero.number(m as f64));
@@ -80,6 +83,9 @@ impl FlatScene<'_> {
             found.diffuse_share = here.select(zero.number(material.diffuse_share), found.diffuse_share);
             if !material.phong.is_empty() {
                 found.plain = found.plain & !here;
+            }
+            if !material.is_closed() {
+                found.closed = found.closed & !here;
             }
             if material.black {
                 found.black = found.black | here;
@@ -116,6 +122,12 @@ impl<S: Simd> LobesAt<S> {
     #[inline(always)]
     pub fn diffuse(&self) -> Vec3<S> {
         self.diffuse
+    }
+
+    /// Weight and exponent of each Phong lobe.
+    #[inline(always)]
+    pub fn phong(&self) -> impl Iterator<Item = (Vec3<S>, Lanes<S>)> {
+        self.phong[..self.count].iter().map(|lobe| (lobe.weight, lobe.exponent))
     }
 
     /// Values (1/sr) and densities of drawing `wi` (1/sr), for local directions above the horizon.

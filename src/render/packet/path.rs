@@ -6,10 +6,11 @@ use super::super::camera::Camera;
 use super::super::plan::Plan;
 use super::super::points::{Decision, keys_of};
 use super::super::tiles::{TILE, Tile};
-use super::closed::Surround;
 use super::flat::FlatScene;
 use super::lobes::cosine_hemisphere;
+use super::outline::Rules;
 use super::shapes::Rays;
+use super::surround::Surround;
 use super::wave::{Group, Row, WAVE, Wave};
 use crate::numeric::lanes::{LANES, Lanes, Mask, Vec3};
 use crate::numeric::simd::{Kernel, Simd, vectorised};
@@ -23,6 +24,8 @@ pub(in crate::render) struct Packets<'a> {
     seed: u64,
     /// The environment's closed form, where the plan has it.
     pub(super) surround: Option<Surround>,
+    /// For lobes under quads that nothing can hide.
+    pub(super) rules: Rules,
 }
 
 /// What takes a pixel's place in its tile, and the radiance of one of its samples: pixel by pixel, in their order.
@@ -32,10 +35,10 @@ impl<'a> Packets<'a> {
     /// Walks through a scene by a plan.
     pub fn new(scene: &'a FlatScene<'a>, plan: Plan, camera: Camera, seed: u64) -> Self {
         let surround = scene.surround().filter(|_| plan.closed_forms);
-        Self { scene, plan, camera, seed, surround }
+        Self { scene, plan, camera, seed, surround, rules: Rules::default() }
     }
 
-    /// Whether what this light shines on surfaces without Phong lobes has a closed form.
+    /// Whether what this light shines on surfaces of most materials has a closed form.
     #[inline(always)]
     pub(super) fn is_closed(&self, light: usize) -> bool {
         self.plan.closed_forms && self.scene.closed[light]
@@ -92,6 +95,7 @@ impl<'a> Packets<'a> {
         group.put(Row::Spread, Lanes::splat(simd, 0.0));
         group.put(Row::Aimed, Lanes::splat(simd, 0.0));
         group.note(simd, Row::Plain, Mask::splat(simd, false));
+        group.note(simd, Row::Closed, Mask::splat(simd, false));
     }
 
     #[inline(always)]

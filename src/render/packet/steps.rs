@@ -1,17 +1,17 @@
 //! What a group's paths do at a scattering event.
 
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::DVec3;
 
 use super::super::integrator::ROULETTE_AFTER;
 use super::super::lights::{Light, QuadLight};
 use super::super::points::{Decision, Points};
-use super::closed::projected_solid_angle;
 use super::flat::light_number;
 use super::lights::{Arrivals, between, from_quad, quad_spread};
 use super::lobes::{Frames, LobesAt, cosine_hemisphere};
 use super::occluders::Occluders;
+use super::outline::Outline;
 use super::path::Packets;
 use super::shapes::{Points3, Rays};
 use super::wave::{Group, Row};
@@ -70,7 +70,8 @@ impl Packets<'_> {
         let mut alive = group.says(simd, Row::Alive);
         let mut radiance = group.get3(simd, Row::Radiance);
         let throughput = group.get3(simd, Row::Throughput);
-        let (plain, spread) = (group.says(simd, Row::Plain), group.get(simd, Row::Spread));
+        let (plain, closed) = (group.says(simd, Row::Plain), group.says(simd, Row::Closed));
+        let spread = group.get(simd, Row::Spread);
         if let Some(environment) = scene.environment
             && (bounce == 0 || self.surround.is_none())
         {
@@ -83,7 +84,7 @@ impl Packets<'_> {
         for (k, light) in scene.shining() {
             let mut found = alive & met.owner.is(zero.number(light_number(k)));
             if self.is_closed(k) {
-                found = found & !plain;
+                found = found & !closed;
             }
             if found.any() {
                 // The first ray is not weighed: it finds what the eye sees.
@@ -141,6 +142,7 @@ impl Packets<'_> {
             group.put3(Row::Throughput, load.throughput);
             group.put(Row::Spread, spread);
             group.note(simd, Row::Plain, vertices.lobes.plain);
+            group.note(simd, Row::Closed, vertices.lobes.closed);
         }
         group.put3(Row::Radiance, load.radiance);
         group.put(Row::Aimed, load.aimed);
@@ -184,15 +186,15 @@ impl Event<'_> {
                 }
                 Light::Quad(quad) => {
                     if self.packets.is_closed(k) {
-                        Self::add_closed(vertices, quad, load);
-                        if !GLOSSY || !(load.alive & !vertices.lobes.plain).any() {
+                        self.add_closed::<S, GLOSSY>(vertices, quad, load);
+                        if !GLOSSY || !(load.alive & !vertices.lobes.closed).any() {
                             continue;
                         }
                     }
                     let point = self.point(simd, Decision::Light(k as u32));
                     let mut arrivals = from_quad(quad, at, point);
                     if self.packets.is_closed(k) {
-                        arrivals.some = arrivals.some & !vertices.lobes.plain;
+                        arrivals.some = arrivals.some & !vertices.lobes.closed;
                     }
                     (arrivals, quad.radiance)
                 }
@@ -221,16 +223,32 @@ impl Event<'_> {
         }
     }
 
-    /// Adds what surfaces without Phong lobes reflect of a light that nothing hides.
+    /// Adds what surfaces reflect of a light that nothing hides, where that has a closed form.
     #[inline(always)]
-    fn add_closed<S: Simd>(vertices: &Vertices<S>, light: &QuadLight, load: &mut Load<S>) {
-        let at = &vertices.at;
-        let zero = vertices.wo.z.number(0.0);
+    fn add_closed<S: Simd, const GLOSSY: bool>(&self, vertices: &Vertices<S>, light: &QuadLight, load: &mut Load<S>) {
+        let (at, wo) = (&vertices.at, vertices.wo);
+        let zero = wo.z.number(0.0);
+        let normal = at.position.vector(light.quad().normal);
         let to_centre = at.position.vector(light.quad().center) - at.position;
-        let before = zero.above(to_centre.dot(at.position.vector(light.quad().normal)));
-        let lit = load.alive & before & vertices.lobes.plain;
-        let irradiance = projected_solid_angle(light, at) * zero.number(FRAC_1_PI);
-        let light = vertices.lobes.diffuse().times(at.normal.vector(light.radiance)) * irradiance;
+        // A surface in the light's own plane gets nothing; which corners rounding lifts above it would be chance.
+        let slack = at.error.dot(normal.abs()) + zero.number(light.quad().error());
+        let before = (-slack).above(to_centre.dot(normal));
+        let lit = load.alive & before & vertices.lobes.closed;
+        if !lit.any() {
+            return;
+        }
+        let outline = Outline::new(light, at);
+        let mut reflected = vertices.lobes.diffuse() * (outline.projected_solid_angle() * zero.number(FRAC_1_PI));
+        if GLOSSY && (lit & !vertices.lobes.plain).any() {
+            let axis = vertices.frame.to_world(Vec3::new(-wo.x, -wo.y, wo.z)).normalize();
+            for (weight, exponent) in vertices.lobes.phong() {
+                // Sharp lobes elsewhere would ask for many panels.
+                let exponent = lit.select(exponent, zero);
+                let moment = outline.phong_moment(axis, exponent, &self.packets.rules);
+                reflected = weight.scaled_plus(moment * zero.number(1.0 / TAU), reflected);
+            }
+        }
+        let light = reflected.times(at.normal.vector(light.radiance));
         load.radiance = load.radiance + lit.keep3(load.throughput.times(light));
     }
 

@@ -29,13 +29,15 @@ pub(super) enum Row {
     Spread = 22,
     /// 1 where the surface that it left has no Phong lobes.
     Plain = 23,
+    /// 1 where what it reflects of quads that nothing can hide has a closed form.
+    Closed = 24,
     /// 1 where it runs.
-    Alive = 24,
+    Alive = 25,
     /// Rays that were sent towards lights.
-    Aimed = 25,
+    Aimed = 26,
 }
 
-const ROWS: usize = 26;
+const ROWS: usize = 27;
 
 /// Paths side by side.
 #[derive(Debug, Clone)]

@@ -185,3 +185,45 @@ fn share_of_first(first: &Node, second: &Node, normal: Vec3) -> f64 {
     let (a, b) = if a + b > 0.0 { (a, b) } else { (first.light, second.light) };
     if a + b > 0.0 { a / (a + b) } else { 0.5 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::uniform_sphere;
+    use crate::numeric::random::{Purpose, RngExt, stream};
+
+    /// Light is lost only where none is: a node that gives nothing lies below the horizon with all of its directions.
+    #[test]
+    fn a_node_gives_nothing_only_below_the_horizon() {
+        let mut rng = stream(9, Purpose::Study, 0);
+        let grid = LatLong::new(48, 25, 0.4);
+        let shares: Vec<f64> =
+            (0..48 * 24).map(|k| if k % 5 == 0 { 0.0 } else { rng.random::<f64>().powi(8) }).collect();
+        let tree = Above::new(&grid, |(a, b), (c, d)| {
+            (c..d).map(|row| shares[row * 48 + a..row * 48 + b].iter().sum::<f64>()).sum()
+        });
+        let mut nothing = 0;
+        let mut waiting = vec![(0, tree.whole)];
+        while let Some((at, range)) = waiting.pop() {
+            let node = &tree.nodes[at];
+            let (columns, rows) = tree.cells(&range, &grid);
+            for _ in 0..20 {
+                let normal = uniform_sphere(DVec2::new(rng.random(), rng.random()));
+                let gives = node.gives(normal.as_vec3());
+                let above = (0..200).any(|_| {
+                    let column = rng.random_range(columns.0..columns.1);
+                    let row = rng.random_range(rows.0..rows.1);
+                    grid.direction(column, row, rng.random(), rng.random()).dot(normal) > 0.0
+                });
+                assert!(gives > 0.0 || node.light == 0.0 || !above, "node {at} below {normal}");
+                assert!(gives <= node.light, "a cosine is at most 1");
+                nothing += usize::from(node.light > 0.0 && gives == 0.0);
+            }
+            if node.halves > 0 {
+                let (first, second, _) = range.halves();
+                waiting.extend([(node.halves as usize, first), (node.halves as usize + 1, second)]);
+            }
+        }
+        assert!(nothing > 10_000, "only {nothing} nodes were dark");
+    }
+}

@@ -183,4 +183,40 @@ mod tests {
             assert!((sum / (2.0 * TAU) - 1.0).abs() < 1e-14, "{width} x {height}: {sum}");
         }
     }
+
+    /// Among 41² directions of a block none is farther from a point than stated, and one nearly is.
+    #[test]
+    fn the_farthest_direction_of_a_block_is_found() {
+        let mut rng = stream(2, Purpose::Study, 0);
+        for case in 0..600 {
+            let grid = LatLong::new(
+                1 + rng.random_range(0..40usize),
+                2 + rng.random_range(0..20usize),
+                3.0 * rng.random::<f64>(),
+            );
+            let columns = (rng.random_range(0..grid.width), grid.width);
+            let rows = (rng.random_range(0..grid.height - 1), grid.height - 1);
+            let columns = (columns.0, rng.random_range(columns.0..columns.1) + 1);
+            let rows = (rows.0, rng.random_range(rows.0..rows.1) + 1);
+            let size = [0.0, 0.3, 0.9, 1.0][case % 4];
+            let p = size * uniform_sphere(DVec2::new(rng.random(), rng.random()));
+            let stated = grid.farthest(p, columns, rows);
+            let at = |(from, to): (usize, usize), k: usize| {
+                let x = from as f64 + (to - from) as f64 * k as f64 / 40.0;
+                let cell = (x as usize).min(to - 1);
+                (cell, x - cell as f64)
+            };
+            let mut found: f64 = 0.0;
+            for k in 0..41 * 41 {
+                let ((column, x), (row, y)) = (at(columns, k % 41), at(rows, k / 41));
+                let (top, bottom) = (PI * row as f64 / (grid.height - 1) as f64, PI / (grid.height - 1) as f64);
+                let theta = top + y * bottom;
+                let (sin, cos) = grid.azimuth(column as f64 + x).sin_cos();
+                found = found.max((DVec3::new(sin * theta.sin(), theta.cos(), -cos * theta.sin()) - p).length());
+            }
+            assert!(found <= stated + 1e-12, "case {case}: {found} beyond {stated}");
+            // The grid of directions misses the farthest by half a step each way.
+            assert!(stated - found < 0.03, "case {case}: {stated} where {found} is farthest");
+        }
+    }
 }
