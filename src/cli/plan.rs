@@ -40,8 +40,9 @@ pub(super) struct Args {
     out: PathBuf,
 }
 
-/// Columns of a parameter.
+/// Columns of a parameter, and how many of them stand side by side.
 const CELL: usize = 15;
+const ABREAST: usize = 3;
 
 /// Scans that are usual, to compare with.
 const STANDARD: [Scan; 4] = [
@@ -114,15 +115,25 @@ fn medians(of: &Precision) -> Vec<f64> {
 /// From this relative error on nothing is known of a parameter.
 const OPEN: f64 = 100.0;
 
+/// Below this, in per cent, errors are told with an exponent.
+const TINY: f64 = 0.01;
+
 /// A relative error in per cent.
 fn percent(e: f64) -> String {
-    if e < OPEN { significant(100.0 * e) } else { "open".into() }
+    match 100.0 * e {
+        _ if e.is_nan() || e >= OPEN => "open".into(),
+        p if p < TINY => format!("{p:.1e}"),
+        p => significant(p),
+    }
 }
 
 /// The same in two digits.
 fn brief(e: f64) -> String {
-    if e >= OPEN {
+    if e.is_nan() || e >= OPEN {
         return percent(e);
+    }
+    if 100.0 * e < TINY {
+        return format!("{:.0e}", 100.0 * e);
     }
     let digits = (1 - (100.0 * e).log10().floor().max(-12.0) as i32).max(0) as usize;
     format!("{:.digits$}", 100.0 * e)
@@ -192,31 +203,20 @@ impl Table {
     fn text(&self, out: &Path) -> String {
         let of = &self.plan.precision;
         let pairs = self.plan.directions.len();
-        let mut text = format!(
-            "{}: {pairs} pairs of directions, {} stops, {} readings, {} h of {} h\n",
+        let head = format!(
+            "{}: {pairs} pairs of directions, {} stops, {} readings, {} h of {} h",
             out.display(),
             of.stops,
             of.rows as f64 * f64::from(self.plan.readings) / f64::from(self.own),
             significant(of.hours),
             significant(self.budget_h)
         );
-        text.extend(self.longer().map(|said| said + "\n"));
+        let mut text = wrapped(&head, COLUMNS).join("\n") + "\n";
+        text.extend(self.longer().map(|said| wrapped(&said, COLUMNS).join("\n") + "\n"));
         text.push('\n');
-        // A parameter's lobe stands above its name: `phong[1].exponent` is wider than its numbers.
-        let cell = |head: &str| format!("{head:>CELL$}");
-        let parts = self.names.iter().map(|n| n.split_once('.').unwrap_or(("", n)));
-        let (lobes, names): (Vec<String>, Vec<String>) = parts.map(|of| (cell(of.0), cell(of.1))).unzip();
-        // Writing to a String can't fail.
-        let _ = writeln!(text, "{:35}{}", "", lobes.concat());
-        let _ = writeln!(text, "{:13}{:>7}{:>8}{:>7}{}", "scan", "stops", "hours", "eff. %", names.concat());
-        for (name, of, efficiency) in &self.scans {
-            let _ = writeln!(text, "{}", Self::line(name, of, *efficiency));
-        }
-        let _ = writeln!(text, "as many hours as the plan:");
-        // A scan that takes longer once can't be read in the plan's hours.
-        for (name, of, efficiency) in self.scans[1..].iter().filter(|(_, of, _)| of.hours <= self.scans[0].1.hours) {
-            let _ = writeln!(text, "{}", Self::line(name, &of.in_hours(self.scans[0].1.hours), *efficiency));
-        }
+        let names: Vec<usize> = (0..self.names.len()).collect();
+        let blocks: Vec<String> = names.chunks(ABREAST).map(|of| self.errors(of)).collect();
+        text.push_str(&blocks.join("\n"));
         text.push_str(&self.against_hours());
         let below = "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' noise and what they \
              share: positions and the certificate. Against hours stand the medians alone: of plans made for less than the budget, else of the same stops \
@@ -255,13 +255,34 @@ impl Table {
         format!("\n{:18}{}\n{}\n\n", "hours", cells(hours.map(significant)), blocks.join("\n"))
     }
 
+    /// Errors of these parameters, side by side, scan by scan.
+    fn errors(&self, of: &[usize]) -> String {
+        // A parameter's lobe stands above its name: `phong[1].exponent` is wider than its numbers.
+        let cell = |head: &str| format!("{head:>CELL$}");
+        let parts = of.iter().map(|&k| self.names[k].split_once('.').unwrap_or(("", &self.names[k])));
+        let (lobes, names): (Vec<String>, Vec<String>) = parts.map(|of| (cell(of.0), cell(of.1))).unzip();
+        let mut text = format!("{:35}{}\n", "", lobes.concat());
+        // Writing to a String can't fail.
+        let _ = writeln!(text, "{:13}{:>7}{:>8}{:>7}{}", "scan", "stops", "hours", "eff. %", names.concat());
+        for (name, scan, efficiency) in &self.scans {
+            let _ = writeln!(text, "{}", Self::line(name, scan, *efficiency, of));
+        }
+        let _ = writeln!(text, "as many hours as the plan:");
+        // A scan that takes longer once can't be read in the plan's hours.
+        let hours = self.scans[0].1.hours;
+        for (name, scan, efficiency) in self.scans[1..].iter().filter(|(_, scan, _)| scan.hours <= hours) {
+            let _ = writeln!(text, "{}", Self::line(name, &scan.in_hours(hours), *efficiency, of));
+        }
+        text
+    }
+
     /// One scan.
-    fn line(name: &str, of: &Precision, efficiency: f64) -> String {
+    fn line(name: &str, scan: &Precision, efficiency: f64, of: &[usize]) -> String {
         let cell = |e: &[f64; 3]| format!("{:>CELL$}", format!("{} ({})", percent(e[1]), brief(e[2])));
-        let cells: Vec<String> = of.errors.iter().map(cell).collect();
-        let hours = significant(of.hours);
+        let cells: Vec<String> = of.iter().map(|&k| cell(&scan.errors[k])).collect();
+        let hours = significant(scan.hours);
         let share = significant(100.0 * efficiency);
-        format!("{name:13}{:>7}{hours:>8}{share:>7}{}", of.stops, cells.join(""))
+        format!("{name:13}{:>7}{hours:>8}{share:>7}{}", scan.stops, cells.join(""))
     }
 
     fn object(&self, out: &Path) -> Value {

@@ -31,7 +31,7 @@ pub(super) struct What {
     /// docs/instrument.md), or raw readings that say what made them
     #[arg(long, value_name = "I")]
     pub instrument: Option<String>,
-    /// Photoelectrons in a reading of 1/sr at cosθo = 1, 1e-3 to 1e15 [default: 100000]; 0 is a detector without any noise
+    /// Photoelectrons a second (in a reading, where no exposures are given) of 1/sr at cosθo = 1, 1e-3 to 1e15 [default: 100000]; 0 is a detector without any noise
     #[arg(long, value_name = "E", allow_negative_numbers = true)]
     pub electrons: Option<f64>,
     /// Read noise, electrons [default: 10]

@@ -24,7 +24,8 @@ pub(super) struct Share {
 const MOST_ROWS: f64 = 1e6;
 
 /// Rows (indices of `shares` and their `directions`, in the order in which they are read) that take no longer than `budget_s`. Each share is multiplied by the same number
-/// and rounded up, as efficient rounding asks (Pukelsheim & Rieder 1992): the number is the largest that the budget pays for.
+/// and rounded up, as efficient rounding asks (Pukelsheim & Rieder 1992): the number is the largest that the budget pays for. What is left then, much where shares
+/// are alike, pays for one row more each of those that come next.
 ///
 /// # Errors
 /// [`Wrong::Budget`] where it does not pay for one row each, [`Wrong::TooMany`].
@@ -35,8 +36,8 @@ pub(super) fn rows(
     budget_s: f64,
 ) -> Result<Vec<u32>, Wrong> {
     let moves = Moves::new(instrument, directions);
-    let seconds = |rows: &[u32]| seconds_of(instrument, &moves, rows);
-    let least_s = seconds(&in_order(shares, 0.0));
+    let seconds = |counts: &[u32]| seconds_of(instrument, &moves, &in_order(shares, counts));
+    let least_s = seconds(&counts(shares, 0.0));
     if least_s > budget_s {
         // Up to the next ms, so that the time that is asked for is enough.
         let least_s = (1e3 * least_s).ceil() / 1e3;
@@ -51,16 +52,46 @@ pub(super) fn rows(
     let (mut low, mut high) = (0.0, 2.0 * budget_s);
     while high - low > 1e-6 * budget_s {
         let middle = 0.5 * (low + high);
-        let fits = seconds(&in_order(shares, middle)) <= budget_s;
+        let fits = seconds(&counts(shares, middle)) <= budget_s;
         if fits { low = middle } else { high = middle }
     }
-    Ok(in_order(shares, low))
+    let sure = counts(shares, low);
+    let mut next = next_in_turn(shares, low);
+    next.truncate((MOST_ROWS - sure.iter().map(|n| f64::from(*n)).sum::<f64>()).max(0.0) as usize);
+    let with = |more: usize| {
+        let mut counts = sure.clone();
+        next[..more].iter().for_each(|&x| counts[x] += 1);
+        counts
+    };
+    // By halves: rows more take longer, but for a move that is saved here and there.
+    let (mut more, mut too_many) = (0, next.len() + 1);
+    while too_many - more > 1 {
+        let middle = usize::midpoint(more, too_many);
+        if seconds(&with(middle)) <= budget_s { more = middle } else { too_many = middle }
+    }
+    Ok(in_order(shares, &with(more)))
 }
 
-/// As many rows as `time_s` seconds shared out give, rounded up, one at least, in stops that are as even as they can be.
-fn in_order(shares: &[Share], time_s: f64) -> Vec<u32> {
-    let count = |s: &Share| ((time_s * s.weight / s.row_s).ceil() as u32).max(1);
-    let counts: Vec<u32> = shares.iter().map(count).collect();
+/// As many rows as `time_s` seconds shared out give, rounded up, one at least.
+fn counts(shares: &[Share], time_s: f64) -> Vec<u32> {
+    shares.iter().map(|s| ((time_s * s.weight / s.row_s).ceil() as u32).max(1)).collect()
+}
+
+/// Who gets a row more first: whose share is next to be rounded up, of equals every second, then every fourth between them and so on.
+fn next_in_turn(shares: &[Share], time_s: f64) -> Vec<usize> {
+    let due = |s: &Share| time_s * s.weight / s.row_s;
+    let missing = |s: &Share| (due(s).ceil().max(1.0) - due(s)) / s.weight * s.row_s;
+    let mut order: Vec<usize> = (0..shares.len()).collect();
+    order.sort_by_key(|x| x.reverse_bits());
+    let mut nearly: Vec<(f64, usize)> = order.into_iter().map(|x| (missing(&shares[x]), x)).collect();
+    // Seconds to the next row, alike to a part in 10⁶ of all: the order above decides.
+    let step = 1e-6 * nearly.iter().map(|of| of.0).filter(|s| s.is_finite()).fold(1e-300, f64::max);
+    nearly.sort_by(|a, b| (a.0 / step).round().total_cmp(&(b.0 / step).round()));
+    nearly.into_iter().map(|of| of.1).collect()
+}
+
+/// So many rows each in stops that are as even as they can be.
+fn in_order(shares: &[Share], counts: &[u32]) -> Vec<u32> {
     let stops: Vec<u32> = counts.iter().zip(shares).map(|(n, s)| n.div_ceil(s.rows_per_stop)).collect();
     let mut taken = vec![0; shares.len()];
     let mut rows = Vec::new();
@@ -111,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn the_budget_is_kept_and_used_but_for_one_round_of_rows() {
+    fn the_budget_is_kept_and_used_but_for_two_rows_and_their_moves() {
         for (budget, rows_per_stop, degrees_per_s) in
             [(25.0, 500, 0.0), (100.0, 500, 0.0), (1000.0, 500, 0.0), (1000.0, 20, 0.0), (1000.0, 20, 5.0)]
         {
@@ -119,13 +150,30 @@ mod tests {
             let rows = rows(&shares(rows_per_stop), &directions(), &instrument, budget).expect("enough");
             let used = seconds(&instrument, &directions(), &rows);
             let longest_move = if degrees_per_s > 0.0 { 7.0 + 40.0 / degrees_per_s } else { 7.0 };
-            assert!(used <= budget && used > budget - 3.0 * (1.0 + longest_move), "{budget}: {used}");
+            assert!(used <= budget && used > budget - 2.0 * (1.0 + longest_move), "{budget}: {used}");
             let longest = rows.chunk_by(|a, b| a == b).map(<[u32]>::len).max().unwrap_or(0);
             assert!(longest <= rows_per_stop as usize);
         }
         let many = rows(&shares(500), &directions(), &moving(0.0), 1e3).expect("enough");
         let count = |x: u32| many.iter().filter(|r| **r == x).count() as f64 / many.len() as f64;
         assert!((count(0) - 0.4).abs() < 0.01 && (count(2) - 0.25).abs() < 0.01);
+    }
+
+    /// Equal shares are not doubled by half of the time: what is left goes to every second one.
+    #[test]
+    fn what_is_left_is_spread_over_equals() {
+        let shares = vec![Share { weight: 0.05, row_s: 8.0, rows_per_stop: 1 }; 20];
+        let wo = (0..20).map(|k| direction_deg(4.0 * f64::from(k), 0.0)).collect();
+        let directions = Directions::List { wi: vec![direction_deg(30.0, 180.0); 20], wo };
+        let counts = |budget: f64| {
+            let rows = rows(&shares, &directions, &moving(0.0), budget).expect("enough");
+            (0..20).map(|x| rows.iter().filter(|r| **r == x).count()).collect::<Vec<_>>()
+        };
+        let least = seconds(&moving(0.0), &directions, &(0..20).collect::<Vec<_>>());
+        assert_eq!(counts(least), [1; 20]);
+        let found = counts(1.5 * least);
+        assert!((28..=31).contains(&found.iter().sum::<usize>()), "{found:?}");
+        assert!(found.windows(3).all(|w| (4..=5).contains(&w.iter().sum::<usize>())), "{found:?}");
     }
 
     #[test]
