@@ -34,6 +34,17 @@ pub(super) struct Reading {
     merl_angles: Option<MerlAngles>,
 }
 
+impl Reading {
+    /// As it was typed, a space before each option.
+    pub(super) fn typed(&self) -> String {
+        let option =
+            |name: &str, value: Option<&str>| value.map_or(String::new(), |value| format!(" --{name} {value}"));
+        let angles = self.merl_angles.map(|angles| if angles == MerlAngles::Edge { "edge" } else { "center" });
+        let quantity = self.quantity.map(|q| if q == Quantity::BrdfCos { "brdf_cos" } else { "brdf" });
+        option("format", self.format.map(Format::name)) + &option("quantity", quantity) + &option("merl-angles", angles)
+    }
+}
+
 fn parse_format(text: &str) -> Result<Format, String> {
     Format::from_name(text).ok_or_else(|| format!("known are {}", Format::ALL.map(Format::name).join(", ")))
 }

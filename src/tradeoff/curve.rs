@@ -59,6 +59,9 @@ pub struct Curve {
     /// All of what sizes are a part of.
     #[serde(skip)]
     pub whole: f64,
+    /// Whether one can ask for its settings as for the whole work: advice takes no others.
+    #[serde(skip)]
+    pub advisable: bool,
 }
 
 /// A setting and what came of it.
@@ -180,6 +183,7 @@ pub(super) fn curves<S>(
             points,
             slopes,
             whole: series.whole,
+            advisable: series.advisable,
         }
     };
     series.iter().enumerate().map(of_series).filter(|curve| !curve.points.is_empty()).collect()

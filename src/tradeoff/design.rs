@@ -67,6 +67,8 @@ pub struct Series {
     pub laws: Vec<Option<Law>>,
     /// All of what the size is a part of, where it is one.
     pub whole: f64,
+    /// Whether one can ask for its settings as for the whole work: advice takes no others.
+    pub advisable: bool,
 }
 
 /// One setting to try.

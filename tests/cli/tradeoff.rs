@@ -60,7 +60,9 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     assert!(b.text("p.svg") == b.text("t/parameters-part.svg"), "the file holds all that the plot shows");
     let drawn = &again["plots"][0]["curves"][0];
     let want: Vec<f64> = errors(&found, "lambert+phong", "parameters").into_iter().filter(|e| *e > 0.0).collect();
-    assert_eq!((&drawn["name"], &drawn["y"]), (&"lambert+phong".into(), &want.into()));
+    assert_eq!(drawn["y"], Value::from(want));
+    let name = drawn["name"].as_str().expect("a name");
+    assert!(name.starts_with("lambert+phong, slope −0."), "{name}");
     let all = b.json(&["plot", "tradeoff", "t/tradeoff.json", "--out", "all.png"]);
     let mut names: Vec<&str> =
         all["plots"].as_array().expect("plots").iter().map(|p| p["name"].as_str().unwrap()).collect();
@@ -72,7 +74,7 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     assert_eq!(rows, 1 + 5, "{csv}");
     let text = b.ok(&[&args[..], &["--advise", "excess=20%"]].concat()).text();
     assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
-    assert!(text.contains("goniofit fit paint.csv --part"), "{text}");
+    assert!(text.contains("goniofit fit paint.csv --model lambert+phong --loss cosine-l2 --part"), "{text}");
 }
 
 #[test]
@@ -142,6 +144,28 @@ fn the_whole_chain_is_off_by_what_its_links_say() {
     let predicted = number(&share["from_data"]).hypot(number(&share["from_pixels"]));
     let measured = number(&share["measured"]["value"]);
     assert!((measured / predicted - 1.0).abs() < 0.2, "{measured} of {predicted}");
+    // Links leave out what the others bring: advice is of the whole.
+    let asked = b.json(&[&args[..], &["--advise", "error=50%"]].concat());
+    let advice = &asked["advice"][0]["advice"];
+    assert_eq!(advice["curve"], "whole chain, time shared out");
+    assert!(number(&advice["error"]["expected"]) > 0.5 * predicted, "{advice}");
+    let ran = b.run(&[&args[..], &["--advise", "time=1h"]].concat());
+    assert!(ran.code == Some(1) && ran.err.contains("instrument=T"), "{}", ran.err);
+}
+
+#[test]
+fn advice_can_be_followed() {
+    let b = Bench::new();
+    // However quick the other ways are, `render` has no option for them.
+    let args = typed("tradeoff render --size 16 --samples 4,16 --trials 3 --ways independent,full,scene --targets 20%");
+    let text = b.ok(&[&args[..], &["--advise", "time=10m"]].concat()).text();
+    let advice = text.rsplit_once("time=10m").expect("advice").1;
+    assert!(advice.contains("plan of the scene") || advice.contains("where it is noisy"), "{text}");
+    let args = typed(
+        "tradeoff simulate --material satin --electrons 5000 --scan in-plane:15 --seed 4 --knobs readings --average 1,4 --trials 3",
+    );
+    let text = b.ok(&[&args[..], &["--advise", "instrument=10h"]].concat()).text();
+    assert!(text.contains("--electrons 5000 --scan in-plane:15 --seed 4"), "{text}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! `goniofit tradeoff fit`.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use super::Common;
@@ -70,8 +71,21 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     targets.sort_by(|a, b| b.total_cmp(a));
     let what = FitSweep { options, parts, strides, targets, losses, models };
     let mut found = sweep(&table, &what, &args.common.effort(args.seed, ui), ui.control())?;
-    found.command = format!("goniofit fit {}", args.file.display());
+    found.command = command(args);
     args.common.finish(&found, None, ui)
+}
+
+/// The command that settings go with: what is the same in all of them.
+fn command(args: &Args) -> String {
+    let mut text = format!("goniofit fit {}{}", args.file.display(), args.reading.typed());
+    // Writing to a String can't fail.
+    if let [model] = &args.models[..] {
+        let _ = write!(text, " --model {model}");
+    }
+    if let [loss] = &args.losses[..] {
+        let _ = write!(text, " --loss {}", loss.name());
+    }
+    text
 }
 
 /// Parts of a table of so many directions that are tried where none are asked for, the smallest first.

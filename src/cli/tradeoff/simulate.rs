@@ -75,8 +75,22 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 /// The command that settings go with.
 fn command(args: &Args, plan: &Plan) -> String {
     let spec = args.what.spec.as_ref().map_or(String::new(), |spec| format!(" {}", spec.display()));
-    let instrument = args.what.instrument.as_ref().map_or(String::new(), |name| format!(" --instrument {name}"));
-    format!("goniofit simulate{spec} --material {}{instrument} --scan {} --out OUT.csv", plan.material, plan.scan)
+    let what = &args.what;
+    let option = |name: &str, value: Option<String>| value.map_or(String::new(), |value| format!(" --{name} {value}"));
+    let instrument = [
+        option("instrument", what.instrument.clone()),
+        option("electrons", what.electrons.map(|x| x.to_string())),
+        option("read-noise", what.read_noise.map(|x| x.to_string())),
+        option("readings", what.readings.map(|x| x.to_string())),
+        if what.noiseless { " --noiseless".into() } else { String::new() },
+    ];
+    format!(
+        "goniofit simulate{spec} --material {}{} --scan {} --seed {} --out OUT.csv",
+        plan.material,
+        instrument.concat(),
+        plan.scan,
+        plan.seed
+    )
 }
 
 /// The values of a knob that is turned.

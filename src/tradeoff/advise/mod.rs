@@ -72,7 +72,7 @@ pub enum NoAdvice {
     },
 }
 
-/// The setting that meets a wish best: the fastest with an error small enough, or the most accurate that is fast enough.
+/// The setting that meets a wish best, out of curves that one can ask for: the fastest with an error small enough, or the most accurate that is fast enough.
 ///
 /// # Errors
 /// [`NoAdvice`] where the sweep has no such measure, or nothing meets the wish.
@@ -84,16 +84,15 @@ pub fn advise(sweep: &Sweep, wish: &Wish) -> Result<Advice, NoAdvice> {
         })?),
         _ => None,
     };
-    let of_instrument = |curve: &&Curve| curve.cost == Cost::Instrument;
+    let curves: Vec<&Curve> = sweep.curves.iter().filter(|curve| curve.advisable).collect();
     let wants_instrument = match wish {
         Wish::InstrumentTime(_) => true,
         Wish::Time(_) => false,
-        Wish::Error(..) => sweep.curves.first().is_some_and(|c| c.cost == Cost::Instrument),
+        Wish::Error(..) => curves.first().is_some_and(|c| c.cost == Cost::Instrument),
     };
-    let advisers: Vec<Adviser<'_>> = sweep
-        .curves
+    let advisers: Vec<Adviser<'_>> = curves
         .iter()
-        .filter(|curve| of_instrument(curve) == wants_instrument)
+        .filter(|curve| (curve.cost == Cost::Instrument) == wants_instrument)
         .filter_map(|curve| Some(Adviser::new(sweep, curve, named.or_else(|| sweep.measure(curve.main))?)))
         .collect();
     let price = |a: &Advice| match (wish, wants_instrument) {
@@ -102,10 +101,18 @@ pub fn advise(sweep: &Sweep, wish: &Wish) -> Result<Advice, NoAdvice> {
         _ => a.error.at_most,
     };
     let all = advisers.iter().flat_map(|adviser| adviser.candidates(wish));
-    all.min_by(|a, b| price(a).total_cmp(&price(b))).ok_or_else(|| out_of_reach(&advisers, wish))
+    let other = if curves.is_empty() {
+        "no setting of the whole was tried"
+    } else if wants_instrument {
+        "its settings take the computer's time: ask for time=T"
+    } else {
+        "its settings take the instrument's time: ask for instrument=T"
+    };
+    all.min_by(|a, b| price(a).total_cmp(&price(b))).ok_or_else(|| out_of_reach(&advisers, wish, other))
 }
 
-fn out_of_reach(advisers: &[Adviser<'_>], wish: &Wish) -> NoAdvice {
+/// `other` says why nothing was tried.
+fn out_of_reach(advisers: &[Adviser<'_>], wish: &Wish, other: &str) -> NoAdvice {
     let all = || advisers.iter().flat_map(|a| a.known.iter().map(move |k| (a, k)));
     let (wanted, nearest) = match wish {
         Wish::Error(_, most) => (
@@ -122,6 +129,7 @@ fn out_of_reach(advisers: &[Adviser<'_>], wish: &Wish) -> NoAdvice {
             }),
         ),
     };
-    let nearest = nearest.unwrap_or_else(|| "no setting was tried twice".into());
+    let untried = if advisers.is_empty() { other } else { "no setting was tried twice" };
+    let nearest = nearest.unwrap_or_else(|| untried.into());
     NoAdvice::OutOfReach { wanted, nearest }
 }

@@ -25,6 +25,7 @@ fn sweep_of(seed: u64) -> Sweep {
         main: 0,
         laws: vec![Some(law)],
         whole: 0.0,
+        advisable: true,
     };
     let sizes = [4.0, 16.0, 64.0, 256.0, 1024.0];
     let settings = sizes.map(|n| Setting::sized(0, n, Knob::Samples.typed(n, 0.0), ()));

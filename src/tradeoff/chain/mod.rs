@@ -95,8 +95,15 @@ fn tried(
     control: Control<'_>,
 ) -> Result<(Vec<Curve>, Option<String>), ChainError> {
     let name = "whole chain, time shared out".to_owned();
-    let series =
-        [Series { name, knob: Knob::Shares, cost: Cost::Instrument, main: 0, laws: vec![None; 2], whole: 0.0 }];
+    let series = [Series {
+        name,
+        knob: Knob::Shares,
+        cost: Cost::Instrument,
+        main: 0,
+        laws: vec![None; 2],
+        whole: 0.0,
+        advisable: true,
+    }];
     let settings: Vec<Setting<Try>> = shares
         .iter()
         .map(|s| Setting {
@@ -114,7 +121,7 @@ fn tried(
     Ok((found, runs.ended))
 }
 
-/// One series a stride, over the readings; and one of samples.
+/// One series a stride, over the readings; and one of samples. Each leaves out what the other brings, so that neither is what the whole chain would come to.
 fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting<Try>>) {
     let (mut series, mut settings) = (Vec::new(), Vec::new());
     for &stride in &what.strides {
@@ -131,6 +138,7 @@ fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting
             main: 0,
             laws: vec![law; 2],
             whole: 0.0,
+            advisable: false,
         });
         for &n in &what.readings {
             let text = Knob::Readings.typed(f64::from(n), 0.0);
@@ -146,6 +154,7 @@ fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting
         main: 0,
         laws: vec![Some(SOBOL), None],
         whole: 0.0,
+        advisable: false,
     });
     for &n in &what.samples {
         let text = Knob::Samples.typed(f64::from(n), 0.0);

@@ -128,7 +128,15 @@ fn design(
                     continue;
                 }
                 let name = if knob == Knob::Part { name.clone() } else { format!("{name}, every N-th entry") };
-                series.push(Series { name, knob, cost: Cost::Computer, main: 0, laws: laws.clone(), whole });
+                series.push(Series {
+                    name,
+                    knob,
+                    cost: Cost::Computer,
+                    main: 0,
+                    laws: laws.clone(),
+                    whole,
+                    advisable: true,
+                });
                 for &step in steps {
                     let size = (whole / step as f64).max(1.0);
                     let (part, stride) = if knob == Knob::Part { (step, 1) } else { (1, step) };
@@ -144,7 +152,15 @@ fn design(
             }
             let name = format!("{name}, as many as a target takes");
             let laws = vec![None; 3];
-            series.push(Series { name, knob: Knob::ExcessTarget, cost: Cost::Computer, main: 0, laws, whole });
+            series.push(Series {
+                name,
+                knob: Knob::ExcessTarget,
+                cost: Cost::Computer,
+                main: 0,
+                laws,
+                whole,
+                advisable: true,
+            });
             for &target in &what.targets {
                 let way = Way {
                     options: FitOptions { target_rmse_excess: Some(target), stride: 1, ..options.clone() },

@@ -128,10 +128,11 @@ pub fn sweep(
     let truth = Truth::of(&shot(u64::MAX / 2)?, &shot(u64::MAX / 2 + 1)?);
     let (series, settings) = design(what);
     let mut gathered: Vec<Gathered> = settings.iter().map(|_| Gathered::default()).collect();
+    let quiet = Control { progress: Control::silent().progress, stop: control.stop };
     let runs = run(&settings, effort, control, |index, turn| {
         let shot = settings[index].what;
         let options = Options { seed: turn.seed, samples: shot.samples, target_error: shot.target, ..base };
-        let (image, seconds) = picture(&scenes[shot.way], what.ways[shot.way], &options, control)?;
+        let (image, seconds) = picture(&scenes[shot.way], what.ways[shot.way], &options, quiet)?;
         if control.stop.requested() {
             return Ok(Trial { seconds, errors: vec![f64::NAN; 4] });
         }
@@ -180,28 +181,32 @@ fn scene(stage: &Stage, subject: Option<&Material>, way: Way) -> Result<Scene, C
 /// The series of all ways, and one of targets.
 fn design(what: &RenderSweep) -> (Vec<Series>, Vec<Setting<Shot>>) {
     let (mut series, mut settings) = (Vec::new(), Vec::new());
-    let new = |name: String, knob: Knob, laws: Vec<Option<Law>>| Series {
+    // Of the ways `render` has options for the scene's own alone.
+    let new = |name: String, knob: Knob, laws: Vec<Option<Law>>, way: Way| Series {
         name,
         knob,
         cost: Cost::Computer,
         main: 0,
         laws,
         whole: 0.0,
+        advisable: way == Way::Scene,
     };
     for (way, kind) in what.ways.iter().enumerate() {
         let of_error = Some(kind.law()).filter(|_| kind.is_unbiased());
-        series.push(new(kind.name(), Knob::Samples, vec![of_error, Some(kind.law()), None, None]));
+        series.push(new(kind.name(), Knob::Samples, vec![of_error, Some(kind.law()), None, None], *kind));
         for &samples in &what.samples {
             let size = f64::from(samples);
             let text = Knob::Samples.typed(size, 0.0);
             settings.push(Setting::sized(series.len() - 1, size, text, Shot { way, samples, target: None }));
         }
     }
+    // As `render` does it, by the scene's plan, where that is among the ways.
+    let way = what.ways.iter().position(|way| *way == Way::Scene).unwrap_or(0);
     if !what.targets.is_empty() {
-        series.push(new("samples where it is noisy".into(), Knob::PictureTarget, vec![None; 4]));
+        series.push(new("samples where it is noisy".into(), Knob::PictureTarget, vec![None; 4], what.ways[way]));
     }
     for &target in &what.targets {
-        let shot = Shot { way: 0, samples: 1 << 24, target: Some(target) };
+        let shot = Shot { way, samples: 1 << 24, target: Some(target) };
         let text = Knob::PictureTarget.typed(target, 0.0);
         settings.push(Setting { promise: Some(target), ..Setting::sized(series.len() - 1, target, text, shot) });
     }
@@ -214,12 +219,12 @@ fn picture(scene: &Scene, way: Way, options: &Options, control: Control<'_>) -> 
         let film = render::render(scene, &way.options(*options), control)?;
         Ok::<_, ChainError>((film.to_image(), film.seconds))
     };
-    if way != Way::Independent || options.samples <= FEW {
+    if way != Way::Independent || options.target_error.is_some() || options.samples <= FEW {
         return shot(options);
     }
     let parts = options.samples.div_ceil(FEW);
     let mut sum: Option<(Image, f64)> = None;
-    for part in 0..parts {
+    for part in (0..parts).take_while(|_| !control.stop.requested()) {
         let seed = options.seed.wrapping_add(u64::from(part).wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let (image, seconds) = shot(&Options { samples: FEW, seed, ..*options })?;
         match &mut sum {

@@ -95,7 +95,15 @@ struct Designed<'a> {
 
 impl Designed<'_> {
     fn begin(&mut self, name: &str, knob: Knob, cost: Cost, main: usize, laws: Vec<Option<Law>>) {
-        self.series.push(Series { name: name.into(), knob, cost, main, laws, whole: 0.0 });
+        self.series.push(Series {
+            name: name.into(),
+            knob,
+            cost,
+            main,
+            laws,
+            whole: 0.0,
+            advisable: knob != Knob::Effects,
+        });
     }
 
     fn push(&mut self, size: f64, text: String, read: Read) {
