@@ -76,6 +76,12 @@ fn commands(run: &Run) -> Vec<Command> {
             push("numbers of the pictures", &["goniofit", "compare", &a, &b]);
         }
     }
+    for sweep in run.sweeps.iter().filter(|sweep| !sweep.file.as_os_str().is_empty()) {
+        push(
+            "curves of accuracy against time",
+            &["goniofit", "plot", "tradeoff", &sweep.file.display().to_string(), "--out", "curves.svg"],
+        );
+    }
     let folder = run.folder.display().to_string();
     if run.kind != Kind::Fit {
         push("this page", &["goniofit", "report", &folder]);

@@ -1,5 +1,6 @@
 //! What accuracy took in time, as far as the run's files have it.
 
+use crate::control::counted;
 use crate::report::plot::{Heading, LogLog, Marks, Point, Series, minus};
 use crate::report::run::Run;
 use crate::report::views::{self, SweepSlope};
@@ -30,7 +31,9 @@ pub(super) struct Time {
 /// What `tradeoff` measured of a stage.
 pub(super) struct Sweep {
     pub title: String,
-    /// Charts of error against time, with what they show.
+    /// How it was measured, and what else one must know.
+    pub said: String,
+    /// Charts of error against time and size, with what they show.
     pub charts: Vec<(String, String)>,
     pub slopes: Vec<SlopeRow>,
 }
@@ -91,9 +94,13 @@ fn fits(run: &Run) -> Option<String> {
 fn sweep(found: &views::Sweep) -> Sweep {
     let chart = |plot: views::SweepPlot| (format!("{}; bars are 95 % intervals.", plot.shows), plot.figure.inline());
     let slopes = found.curves.iter().flat_map(|c| c.slopes.iter().filter_map(|s| slope(&c.name, s)));
+    let trials = format!("{} of each setting, seed {}", counted(found.trials.into(), "trial"), found.seed);
+    let settings = (!found.command.is_empty()).then(|| format!("settings are options of: {}", found.command));
+    let said = std::iter::once(trials).chain(settings).chain(found.reference.clone()).chain(found.notes.clone());
     Sweep {
         title: format!("{}: {}", found.stage, found.subject),
-        charts: found.against_time().into_iter().map(chart).collect(),
+        said: said.collect::<Vec<_>>().join(". ") + ".",
+        charts: found.against_time().into_iter().chain(found.beside_theory()).map(chart).collect(),
         slopes: slopes.collect(),
     }
 }

@@ -162,7 +162,10 @@ impl Run {
         }
         for path in sweeps(&self.folder) {
             let sweep = self.extra(&path, serde_json::from_value::<Sweep>);
-            self.sweeps.extend(sweep);
+            self.sweeps.extend(sweep.map(|mut sweep| {
+                sweep.file = path;
+                sweep
+            }));
         }
     }
 

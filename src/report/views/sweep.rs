@@ -1,8 +1,10 @@
 //! A sweep of `tradeoff`, as its file has it, and its plots: each error against the time, and against its size with the slope of theory beside it.
 
+use std::path::PathBuf;
+
 use serde::Deserialize;
 
-use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope};
+use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope, minus};
 
 /// What `goniofit tradeoff` measured of a stage, as `tradeoff.json` has it; what is neither drawn nor listed is not read.
 #[derive(Debug, Clone, Deserialize)]
@@ -14,6 +16,24 @@ pub struct Sweep {
     measures: Vec<Measure>,
     /// The curves.
     pub curves: Vec<SweepCurve>,
+    /// Where it was read.
+    #[serde(skip)]
+    pub file: PathBuf,
+    /// The command that the settings go with; none where there is none.
+    #[serde(default)]
+    pub command: String,
+    /// What errors are measured against, and how good that is.
+    #[serde(default)]
+    pub reference: Vec<String>,
+    /// What a reader must know.
+    #[serde(default)]
+    pub notes: Vec<String>,
+    /// Trials of each setting.
+    #[serde(default)]
+    pub trials: u32,
+    /// Key of all seeds.
+    #[serde(default)]
+    pub seed: u64,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -122,14 +142,28 @@ impl Sweep {
     #[must_use]
     pub fn plots(&self) -> Vec<SweepPlot> {
         let mut plots = self.against_time();
+        plots.extend(self.knobs().into_iter().flat_map(|knob| self.against_size(knob, |_| true)));
+        plots
+    }
+
+    /// The errors of which theory knows a slope against the size, that of theory and the measured one beside them.
+    #[must_use]
+    pub fn beside_theory(&self) -> Vec<SweepPlot> {
+        let known = |knob: &str, measure: &str| {
+            self.curves.iter().any(|c| c.knob == knob && c.main == measure && c.law(measure).is_some())
+        };
+        let of = |knob| self.against_size(knob, |measure| known(knob, measure));
+        self.knobs().into_iter().flat_map(of).collect()
+    }
+
+    fn knobs(&self) -> Vec<&str> {
         let mut knobs: Vec<&str> = Vec::new();
         for curve in self.curves.iter().filter(|c| !c.is_of_effects()) {
             if !knobs.contains(&curve.knob.as_str()) {
                 knobs.push(&curve.knob);
             }
         }
-        plots.extend(knobs.into_iter().flat_map(|knob| self.against_size(knob)));
-        plots
+        knobs
     }
 
     /// The main error of all curves against the time that they spend: the computer's, then the instrument's.
@@ -159,23 +193,26 @@ impl Sweep {
         self.chart(name, &format!("time of {whose} [s]"), main, series, Vec::new())
     }
 
-    /// Every error of the curves of a knob against its size.
-    fn against_size(&self, knob: &str) -> Vec<SweepPlot> {
+    /// Errors of the curves of a knob against its size, those measures that are `wanted`.
+    fn against_size(&self, knob: &str, wanted: impl Fn(&str) -> bool) -> Vec<SweepPlot> {
         let curves = || self.curves.iter().filter(move |c| c.knob == knob);
         let axis = curves().next().map_or("", |c| &c.axis);
         let of = |(m, measure): (usize, &Measure)| {
-            let series = series(curves().map(|c| (c, c.points(m, |p| p.size), false)));
+            let mut series = series(curves().map(|c| (c, c.points(m, |p| p.size), false)));
             let mut slopes: Vec<Slope> = Vec::new();
-            for (beside, name) in series.iter().map(|s| &s.name).enumerate() {
-                let own = curves().find(|c| c.name == *name).and_then(|c| c.law(&measure.name));
-                let Some((slope, _)) = own.map(Law::slope) else { continue };
+            for (beside, of) in series.iter_mut().enumerate() {
+                let Some(curve) = curves().find(|c| c.name == of.name) else { continue };
+                if let Some(slope) = curve.slope(&measure.name).and_then(|s| s.slope.value) {
+                    of.name = format!("{}, slope {}", of.name, minus(&format!("{slope:.2}")));
+                }
+                let Some((slope, _)) = curve.law(&measure.name).map(Law::slope) else { continue };
                 if !slopes.iter().any(|s| s.slope == slope) {
-                    slopes.push(Slope { name: format!("theory {slope}").replace('-', "−"), slope, beside });
+                    slopes.push(Slope { name: format!("theory {}", minus(&slope.to_string())), slope, beside });
                 }
             }
             self.chart(format!("{}-{knob}", measure.name), axis, &measure.name, series, slopes)
         };
-        self.measures.iter().enumerate().filter_map(of).collect()
+        self.measures.iter().enumerate().filter(|(_, measure)| wanted(&measure.name)).filter_map(of).collect()
     }
 
     fn chart(&self, name: String, x: &str, y: &str, series: Vec<Series>, slopes: Vec<Slope>) -> Option<SweepPlot> {
@@ -201,8 +238,12 @@ impl SweepCurve {
         self.knob == "effects"
     }
 
+    fn slope(&self, measure: &str) -> Option<&SweepSlope> {
+        self.slopes.iter().find(|s| s.measure == measure)
+    }
+
     fn law(&self, measure: &str) -> Option<&Law> {
-        self.slopes.iter().find(|s| s.measure == measure).and_then(|s| s.law.as_ref())
+        self.slope(measure).and_then(|s| s.law.as_ref())
     }
 
     /// The settings whose error is known to be more than 0.
