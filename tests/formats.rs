@@ -410,6 +410,30 @@ fn csv_keeps_everything_of_every_fixture() {
     }
 }
 
+/// Whoever fills them in, a reduction too: errors of a value that is masked are empty cells, which reading and writing again keeps.
+#[test]
+fn errors_of_masked_values_are_empty() {
+    let mut table = fixture("every-column-in-any-order.csv");
+    let (n, row) = (table.len(), 1);
+    table.values[row] = f64::NAN; // of the first channel alone
+    assert!(table.sigma.as_ref().is_some_and(|sigma| sigma[row].is_finite()) && table.common[0][row].is_finite());
+    let text = String::from_utf8(written(&table, Format::Csv).0).expect("text");
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().expect("a head").split(',').collect();
+    let cells: Vec<&str> = lines.nth(row).expect("the row").split(',').collect();
+    let [first, second] = [&table.channels[0], &table.channels[1]];
+    for prefix in ["", "sigma_", "common_1_", "common_2_"] {
+        let cell = |channel: &str| {
+            cells[names.iter().position(|name| *name == format!("{prefix}{channel}")).expect("a column")]
+        };
+        assert_eq!(cell(first), "", "{prefix}{first}");
+        assert_ne!(cell(second), "", "{prefix}{second}");
+    }
+    assert!(table.values[n + row].is_finite(), "the other channel has a value there");
+    let again = written(&read_bytes(text.clone().into_bytes(), None), Format::Csv).0;
+    assert_eq!(String::from_utf8(again).expect("text"), text);
+}
+
 #[test]
 fn what_a_format_cannot_hold_is_refused_with_the_reason() {
     let refuse = |table: &Measurement, format| {

@@ -110,8 +110,9 @@ fn write_row(measurement: &Measurement, i: usize, text: &mut String) {
     let errors = measurement.sigma.iter().chain(&measurement.common).chain(&measurement.row);
     let layers = std::iter::once(&measurement.values).chain(errors);
     for layer in layers {
-        for value in layer.iter().skip(i).step_by(n.max(1)) {
-            push_number(text, *value);
+        for k in (i..layer.len()).step_by(n.max(1)) {
+            // Errors of what is masked are not read.
+            push_number(text, if measurement.values[k].is_nan() { f64::NAN } else { layer[k] });
         }
     }
     if has_weight_column(measurement) {
