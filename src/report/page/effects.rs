@@ -93,7 +93,16 @@ fn scene(run: &Run) -> Option<Listed> {
         plain(scene_plan(&Stage::built_in(name).ok()?, material).ok()?)
     };
     let out = run.folder.join("effects.json").display().to_string();
-    let command = format!("{} > {}", typed(&["goniofit", "effects", "--scene", name, "--json"]), typed(&[&out]));
+    let mut words: Vec<String> = ["goniofit", "effects", "--scene", name].map(String::from).to_vec();
+    if run.kind == Kind::Demo {
+        words.extend(["--material".into(), run.title.clone()]);
+    }
+    if let Some(found) = found {
+        let size = format!("{}x{}", found["width"], found["height"]);
+        words.extend(["--size".into(), size, "--samples".into(), found["samples"].to_string()]);
+        words.extend(["--seed".into(), found["seed"].to_string()]);
+    }
+    let command = format!("{} --json > {}", typed(&words), typed(&[&out]));
     Some(Listed::new(format!("The scene, {name}"), effects, found.is_some(), command))
 }
 

@@ -97,12 +97,19 @@ fn sweep(found: &views::Sweep) -> Sweep {
     let trials = format!("{} of each setting, seed {}", counted(found.trials.into(), "trial"), found.seed);
     let settings = (!found.command.is_empty()).then(|| format!("settings are options of: {}", found.command));
     let said = std::iter::once(trials).chain(settings).chain(found.reference.clone()).chain(found.notes.clone());
+    let said = said.map(|line| sentence(&line));
     Sweep {
         title: format!("{}: {}", found.stage, found.subject),
-        said: said.collect::<Vec<_>>().join(". ") + ".",
+        said: said.collect::<Vec<_>>().join(" "),
         charts: found.against_time().into_iter().chain(found.beside_theory()).map(chart).collect(),
         slopes: slopes.collect(),
     }
+}
+
+/// With a capital letter and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
 }
 
 /// A slope that theory knows.
