@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::failure::Failure;
+use super::text::option;
 use super::ui::Ui;
 use crate::chain::{self, Scatter};
 use crate::control::counted;
@@ -35,10 +36,12 @@ pub(super) struct Reading {
 }
 
 impl Reading {
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions { format: self.format, quantity: self.quantity, merl_angles: self.merl_angles }
+    }
+
     /// As it was typed, a space before each option.
     pub(super) fn typed(&self) -> String {
-        let option =
-            |name: &str, value: Option<&str>| value.map_or(String::new(), |value| format!(" --{name} {value}"));
         let angles = self.merl_angles.map(|angles| if angles == MerlAngles::Edge { "edge" } else { "center" });
         let quantity = self.quantity.map(|q| if q == Quantity::BrdfCos { "brdf_cos" } else { "brdf" });
         option("format", self.format.map(Format::name)) + &option("quantity", quantity) + &option("merl-angles", angles)
@@ -62,12 +65,6 @@ fn parse_angles(text: &str) -> Result<MerlAngles, String> {
         "center" => Ok(MerlAngles::Center),
         "edge" => Ok(MerlAngles::Edge),
         _ => Err("known are center, edge".into()),
-    }
-}
-
-impl Reading {
-    pub fn options(&self) -> ReadOptions {
-        ReadOptions { format: self.format, quantity: self.quantity, merl_angles: self.merl_angles }
     }
 }
 

@@ -1,9 +1,14 @@
 //! Text as a terminal shows it: lines that fit.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
 /// Columns that tables keep to, whatever the terminal.
 pub(super) const COLUMNS: usize = 80;
+
+/// An option as it is typed, a space before it; nothing where it was not given.
+pub(super) fn option(name: &str, value: Option<impl Display>) -> String {
+    value.map_or(String::new(), |value| format!(" --{name} {value}"))
+}
 
 /// Words in lines of at most so many characters; a longer word has its own.
 pub(super) fn wrapped(words: &str, width: usize) -> Vec<String> {

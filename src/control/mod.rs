@@ -77,6 +77,14 @@ impl std::fmt::Debug for Control<'_> {
     }
 }
 
+impl Control<'_> {
+    /// The same wish to stop, without a progress report: for steps of a longer work that has its own.
+    #[must_use]
+    pub fn quiet(self) -> Self {
+        Self { progress: &Quiet, ..self }
+    }
+}
+
 impl Control<'static> {
     /// No progress report, never stopped.
     #[must_use]

@@ -7,6 +7,7 @@ use crate::chain::{self, Stage};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::render::{parse_size, read_stage};
+use crate::cli::text::option;
 use crate::cli::ui::Ui;
 use crate::measurement::ReadOptions;
 use crate::render::Strategy;
@@ -95,7 +96,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let what = RenderSweep { size, samples, targets: args.targets.clone(), ways, reference: args.reference };
     let effort = args.common.effort(args.seed, ui);
     let mut found = sweep(&stage, subject.as_ref(), &what, &effort, ui.control())?;
-    let material = args.material.as_ref().map_or(String::new(), |name| format!(" --material {name}"));
+    let material = option("material", args.material.as_ref());
     found.command = format!("goniofit render {named}{material} --size {}x{} --out OUT.exr", size.0, size.1);
     args.common.finish(&found, None, ui)
 }

@@ -4,6 +4,7 @@ use super::{Common, parse_positive};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::simulation::{Plan, What};
+use crate::cli::text::option;
 use crate::cli::ui::Ui;
 use crate::gonio::Scan;
 use crate::tradeoff::simulate::{SimulateSweep, sweep};
@@ -76,12 +77,11 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 fn command(args: &Args, plan: &Plan) -> String {
     let spec = args.what.spec.as_ref().map_or(String::new(), |spec| format!(" {}", spec.display()));
     let what = &args.what;
-    let option = |name: &str, value: Option<String>| value.map_or(String::new(), |value| format!(" --{name} {value}"));
     let instrument = [
-        option("instrument", what.instrument.clone()),
-        option("electrons", what.electrons.map(|x| x.to_string())),
-        option("read-noise", what.read_noise.map(|x| x.to_string())),
-        option("readings", what.readings.map(|x| x.to_string())),
+        option("instrument", what.instrument.as_ref()),
+        option("electrons", what.electrons),
+        option("read-noise", what.read_noise),
+        option("readings", what.readings),
         if what.noiseless { " --noiseless".into() } else { String::new() },
     ];
     format!(

@@ -201,7 +201,7 @@ fn above_axis<S: Simd>(
     let rest = one - m2;
     let mut widths: Row = [0.0; LANES];
     (length * (exponent + one).sqrt()).store(&mut widths);
-    // Nodes lie by half as far apart in the middle.
+    // In the middle nodes lie half as far again from each other.
     let (rule, panels) = rules.of(1.5 * widths.iter().fold(0.0, |most: f64, w| most.max(*w)), cut);
     let (mut turn, mut along) = (zero, zero);
     for panel in 0..panels as u32 {

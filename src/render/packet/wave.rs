@@ -29,7 +29,7 @@ pub(super) enum Row {
     Spread = 22,
     /// 1 where the surface that it left has no Phong lobes.
     Plain = 23,
-    /// 1 where what it reflects of quads that nothing can hide has a closed form.
+    /// 1 where what that surface reflects of quads that nothing can hide has a closed form.
     Closed = 24,
     /// 1 where it runs.
     Alive = 25,

@@ -80,18 +80,19 @@ impl<'a> Links<'a> {
         match what {
             Try::Data(readings, stride) => {
                 let (fitted, seconds) = self.fitted(readings, stride, seed)?;
-                let shot = |scene: &Scene| picture(scene, self.what.size, SHARED, seed, self.quiet());
+                let shot = |scene: &Scene| picture(scene, self.what.size, SHARED, seed, self.control.quiet());
                 let own = shot(&scene_with(self.what, &fitted)?)?;
                 let error = own.off_by(&shot(&self.truth_scene)?);
                 Ok(Trial { seconds, errors: vec![error, parameter_error(&fitted, self.what.material)] })
             }
             Try::Pixels(samples) => {
-                let film = picture(&self.truth_scene, self.what.size, samples, seed, self.quiet())?;
+                let film = picture(&self.truth_scene, self.what.size, samples, seed, self.control.quiet())?;
                 Ok(Trial { seconds: film.seconds, errors: vec![self.off(&film.to_image()), f64::NAN] })
             }
             Try::Whole(readings, stride, samples) => {
                 let (fitted, seconds) = self.fitted(readings, stride, seed)?;
-                let film = picture(&scene_with(self.what, &fitted)?, self.what.size, samples, seed, self.quiet())?;
+                let film =
+                    picture(&scene_with(self.what, &fitted)?, self.what.size, samples, seed, self.control.quiet())?;
                 let errors = vec![self.off(&film.to_image()), parameter_error(&fitted, self.what.material)];
                 Ok(Trial { seconds: seconds + film.seconds, errors })
             }
@@ -106,7 +107,8 @@ impl<'a> Links<'a> {
     /// A material measured and fitted, and the time of the fit, s.
     fn fitted(&self, readings: u32, stride: usize, seed: u64) -> Result<(Material, f64), ChainError> {
         let source = Source::Fitted(Box::new(self.what.material.clone()));
-        let table = measure(self.what.name, &source, &self.instrument(readings), self.what.scan, seed, self.quiet())?;
+        let table =
+            measure(self.what.name, &source, &self.instrument(readings), self.what.scan, seed, self.control.quiet())?;
         let options = FitOptions {
             stride,
             draw: seed,
@@ -116,11 +118,6 @@ impl<'a> Links<'a> {
         let clock = Instant::now();
         let fitted = fit(&table, &options)?.material;
         Ok((fitted, clock.elapsed().as_secs_f64()))
-    }
-
-    /// The wish to stop, without progress of each step.
-    fn quiet(&self) -> Control<'a> {
-        Control { progress: Control::silent().progress, stop: self.control.stop }
     }
 }
 

@@ -128,11 +128,10 @@ pub fn sweep(
     let truth = Truth::of(&shot(u64::MAX / 2)?, &shot(u64::MAX / 2 + 1)?);
     let (series, settings) = design(what);
     let mut gathered: Vec<Gathered> = settings.iter().map(|_| Gathered::default()).collect();
-    let quiet = Control { progress: Control::silent().progress, stop: control.stop };
     let runs = run(&settings, effort, control, |index, turn| {
         let shot = settings[index].what;
         let options = Options { seed: turn.seed, samples: shot.samples, target_error: shot.target, ..base };
-        let (image, seconds) = picture(&scenes[shot.way], what.ways[shot.way], &options, quiet)?;
+        let (image, seconds) = picture(&scenes[shot.way], what.ways[shot.way], &options, control.quiet())?;
         if control.stop.requested() {
             return Ok(Trial { seconds, errors: vec![f64::NAN; 4] });
         }

@@ -117,7 +117,7 @@ impl<'a> Bench<'a> {
     /// Raw readings, and the time that they took, s.
     fn read(&self, accuracy: f64, left_out: &[&str], seed: u64) -> Result<(Raw, f64), ChainError> {
         let SimulateSweep { source, name, instrument, scan, .. } = self.what;
-        let quiet = Control { progress: Control::silent().progress, stop: self.control.stop };
+        let quiet = self.control.quiet();
         with_job(name, source, instrument, scan, seed, quiet, |job| {
             let clock = Instant::now();
             let raw = Job { accuracy, left_out, ..*job }.run(quiet);
@@ -175,7 +175,7 @@ impl<'a> Bench<'a> {
 
     fn noisy(&mut self, instrument: &Instrument, scan: &Scan, seed: u64) -> Result<Trial, ChainError> {
         let SimulateSweep { source, name, .. } = self.what;
-        let quiet = Control { progress: Control::silent().progress, stop: self.control.stop };
+        let quiet = self.control.quiet();
         let clock = Instant::now();
         let table = measure(name, source, instrument, scan, seed, quiet)?;
         let seconds = clock.elapsed().as_secs_f64();
