@@ -4,7 +4,7 @@
 
 mod promises;
 
-use promises::{Kept, fit, render, simulate};
+use promises::{Kept, chain, fit, render, simulate};
 
 /// A true 95 % is below 89 of 100 once in 150 sets.
 fn holds(kept: &Kept) {
@@ -24,4 +24,9 @@ fn a_picture_as_it_is_advised_is_as_good_as_it_is_promised() {
 #[test]
 fn a_measurement_as_it_is_advised_is_as_good_as_it_is_promised() {
     holds(&simulate(10, 10, 15.0));
+}
+
+#[test]
+fn a_chain_as_it_is_advised_is_as_good_as_it_is_promised() {
+    holds(&chain(10, 10, 0.05));
 }

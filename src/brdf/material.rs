@@ -181,12 +181,12 @@ struct GlossyTerm {
     exponent: f64,
 }
 
-/// A sum of Lambert and Phong lobes, ready to be evaluated and sampled: each lobe is drawn in proportion to its mean weight.
+/// A sum of Lambert and Phong lobes, ready to be evaluated and sampled: each lobe is drawn in proportion to what it reflects, about.
 #[derive(Debug, Clone)]
 pub struct Reflectance {
     diffuse: Vec<f64>,
     glossy: Vec<GlossyTerm>,
-    /// Probability of drawing from the diffuse lobe, then from each glossy one.
+    /// Mean weight of the diffuse lobe, then of each glossy one, in proportion to which they are drawn head on.
     share: Vec<f64>,
 }
 
@@ -216,7 +216,16 @@ impl Reflectance {
         Self::new(diffuse, phong.into_iter().map(|(weight, exponent)| GlossyTerm { weight, exponent }).collect())
     }
 
-    /// The Lambert lobe's weights and the probability of drawing from it; of each Phong lobe weights, exponent and probability.
+    /// Probability of drawing from the diffuse lobe for an eye at cosθo = `cos`, and by what the shares of glossy ones are to be multiplied, before
+    /// [`phong::seen`].
+    fn drawn(&self, cos: f64) -> (f64, f64) {
+        let glossy = self.glossy.iter().zip(&self.share[1..]).map(|(t, s)| s * phong::seen(t.exponent, cos));
+        let scale = 1.0 / (self.share[0] + glossy.sum::<f64>());
+        (self.share[0] * scale, scale)
+    }
+
+    /// The Lambert lobe's weights and its share; of each Phong lobe weights, exponent and share. Shares add up to 1; lobes are drawn in proportion to them, those
+    /// of Phong lobes times [`phong::seen`].
     #[allow(clippy::type_complexity)] // two lobes' parts
     pub fn parts(&self) -> (&[f64], f64, impl Iterator<Item = (&[f64], f64, f64)>) {
         let glossy = self.glossy.iter().zip(&self.share[1..]);
@@ -264,13 +273,14 @@ impl Brdf for Reflectance {
             return None;
         }
         let point = DVec2::new(u[1], u[2]);
-        let mut rest = u[0] - self.share[0];
+        let (diffuse, scale) = self.drawn(wo.z);
+        let mut rest = u[0] - diffuse;
         let mut chosen = None;
         for (term, share) in self.glossy.iter().zip(&self.share[1..]) {
             if rest < 0.0 {
                 break;
             }
-            (chosen, rest) = (Some(term), rest - share);
+            (chosen, rest) = (Some(term), rest - scale * share * phong::seen(term.exponent, wo.z));
         }
         let wi = match chosen {
             None => cosine_hemisphere(point),
@@ -284,8 +294,11 @@ impl Brdf for Reflectance {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return 0.0;
         }
-        let glossy = self.glossy.iter().zip(&self.share[1..]).map(|(t, s)| s * phong::sampling_pdf(t.exponent, wi, wo));
-        self.share[0] * cosine_hemisphere_pdf(wi) + glossy.sum::<f64>()
+        let (diffuse, scale) = self.drawn(wo.z);
+        let of =
+            |(t, s): (&GlossyTerm, &f64)| s * phong::seen(t.exponent, wo.z) * phong::sampling_pdf(t.exponent, wi, wo);
+        let glossy = self.glossy.iter().zip(&self.share[1..]).map(of);
+        diffuse * cosine_hemisphere_pdf(wi) + scale * glossy.sum::<f64>()
     }
 }
 

@@ -158,6 +158,19 @@ pub fn sampling_pdf(exponent: f64, wi: DVec3, wo: DVec3) -> f64 {
     (exponent + 1.0) / TAU * power(exponent, ln_cos_alpha(wi, wo))
 }
 
+/// [`directional_albedo`] at cosθ = `cos`, within some 15 %: how often a lobe is worth drawing. Head on it is 1, at grazing angles half a Gaussian of variance
+/// 1/n is left above the horizon.
+#[must_use]
+pub fn seen(exponent: f64, cos: f64) -> f64 {
+    let least = SEEN_GRAZING / (exponent + SEEN_OFFSET);
+    (cos * cos * (1.0 - least) + least).sqrt()
+}
+
+/// Of [`seen`]: 1/2π of a Gaussian, and what makes it right for n = 1.
+pub(crate) const SEEN_GRAZING: f64 = 0.16;
+/// The second of these.
+pub(crate) const SEEN_OFFSET: f64 = 0.6;
+
 /// Share of the light from polar angle `theta` (rad, [0, π/2]) that a Phong lobe of weight 1 reflects, to about 1e-12;
 /// at most 1. By reciprocity also the radiance towards `theta` in a uniform surround of radiance 1.
 ///

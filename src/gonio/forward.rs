@@ -67,12 +67,17 @@ pub struct Job<'a> {
     pub seed: u64,
     /// Relative error that means over source and aperture may have.
     pub accuracy: f64,
+    /// One order of the rules over source, aperture and spot, instead of those that `accuracy` asks for: 1 to [`MOST_ORDER`]. What it leaves is not
+    /// known then: [`Raw::quadrature_error`] is infinite.
+    pub order: Option<u32>,
     /// Effects that are left out, by name.
     pub left_out: &'a [&'a str],
 }
 
 /// The relative error of means over source and aperture, if nothing else is asked for.
 pub const ACCURACY: f64 = 1e-6;
+/// Largest order that one may set: two cones and a spot take some 10⁸ directions a reading then.
+pub const MOST_ORDER: u32 = 16;
 
 /// The pairs of directions above the horizon in the order in which `rows` has them; all in their own order where it is empty.
 #[must_use]
@@ -106,6 +111,7 @@ impl<'a> Job<'a> {
             rows: &[],
             seed: 0,
             accuracy: ACCURACY,
+            order: None,
             left_out: &[],
         }
     }
@@ -186,9 +192,22 @@ impl Job<'_> {
 
     /// What passes are made from.
     pub(super) fn maker<'b>(&'b self, actual: &'b Actual) -> Maker<'b> {
-        let Self { truth, lobes, kinked, channels, instrument, seed, accuracy, dimension, .. } = *self;
+        let Self { truth, lobes, kinked, channels, instrument, seed, accuracy, order, dimension, .. } = *self;
         let stop = Control::silent().stop;
-        Maker { instrument, dimension, channels, actual, truth, lobes, kinked, seed, accuracy, stop, deadline: None }
+        Maker {
+            instrument,
+            dimension,
+            channels,
+            actual,
+            truth,
+            lobes,
+            kinked,
+            seed,
+            accuracy,
+            order,
+            stop,
+            deadline: None,
+        }
     }
 
     /// Readings with these signals.

@@ -37,7 +37,7 @@ pub use contribution::{Change, Contribution, Contributions};
 pub use cost::{hours, seconds};
 pub use effects::plan;
 pub(crate) use effects::tilt::frame as lean;
-pub use forward::{ACCURACY, Job, lit_rows};
+pub use forward::{ACCURACY, Job, MOST_ORDER, lit_rows};
 pub use idle::idle;
 pub use instrument::Instrument;
 pub use presets::{PRESETS, Preset};

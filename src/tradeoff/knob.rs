@@ -18,6 +18,8 @@ pub enum Knob {
     ExcessTarget,
     /// Relative error that means over the instrument's cones may have.
     Quadrature,
+    /// Order of the rules over cones and spot.
+    Order,
     /// Effects of the instrument that are left out.
     Effects,
     /// Readings averaged at each pair of directions.
@@ -40,6 +42,7 @@ impl Knob {
             Self::Stride | Self::Part => "directions fitted",
             Self::ExcessTarget => "rmse excess asked for",
             Self::Quadrature => "relative error of means over cones asked for",
+            Self::Order => "order of the rules over cones and spot",
             Self::Effects => "effects left out",
             Self::Readings => "readings a pair of directions",
             Self::Dwell => "exposure, times the instrument's own",
@@ -80,6 +83,7 @@ impl Knob {
             Self::ExcessTarget => format!("--target-rmse-excess {}", short(size)),
             Self::Readings => format!("--readings {size:.0}"),
             Self::Dwell => format!("exposures × {}", short(size)),
+            Self::Order => format!("order {size:.0}"),
             Self::Effects | Self::Step | Self::Shares => String::new(),
         }
     }

@@ -133,6 +133,22 @@ fn means_over_cones_are_as_good_as_they_are_asked_for_and_effects_have_their_siz
 }
 
 #[test]
+fn rules_over_the_cones_of_a_table_have_the_order_of_its_kinks() {
+    let b = Bench::new();
+    b.paint("paint.csv");
+    let args = typed(
+        "tradeoff simulate --material paint.csv --instrument commercial --scan in-plane:15 --knobs order --orders 1,2,4,8 --trials 2",
+    );
+    let found = b.json(&args);
+    let slope = slope(&found, "order of the rules", "reading");
+    assert!((-4.0..-1.5).contains(&slope), "{slope}");
+    let ran = b.run(&[&args[..], &["--advise", "error=1%"]].concat());
+    assert_eq!(ran.code, Some(1), "no command has an option for an order: {}", ran.err);
+    let ran = b.run(&typed("tradeoff simulate --material satin --knobs order --orders 17"));
+    assert!(ran.code == Some(2) && ran.err.contains("17"), "{}", ran.err);
+}
+
+#[test]
 fn the_whole_chain_is_off_by_what_its_links_say() {
     let b = Bench::new();
     let args = typed(
@@ -144,6 +160,12 @@ fn the_whole_chain_is_off_by_what_its_links_say() {
     let predicted = number(&share["from_data"]).hypot(number(&share["from_pixels"]));
     let measured = number(&share["measured"]["value"]);
     assert!((measured / predicted - 1.0).abs() < 0.2, "{measured} of {predicted}");
+    // From reading to image: four times the readings leave half of each error.
+    for name in ["brdf", "parameters", "image"] {
+        let errors = errors(&found, "readings, all fitted", name);
+        let ratio = errors[0] / errors[1];
+        assert!((1.4..2.9).contains(&ratio), "{name}: {errors:?}");
+    }
     // Links leave out what the others bring: advice is of the whole.
     let asked = b.json(&[&args[..], &["--advise", "error=50%"]].concat());
     let advice = &asked["advice"][0]["advice"];

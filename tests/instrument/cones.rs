@@ -91,6 +91,10 @@ impl Case {
 
     /// The same; told that the truth is a sum of lobes, it needs no sum over directions.
     fn read_as(&self, accuracy: f64, told: bool) -> (f64, f64) {
+        self.read_with(accuracy, None, told)
+    }
+
+    fn read_with(&self, accuracy: f64, order: Option<u32>, told: bool) -> (f64, f64) {
         let instrument = Instrument {
             source: Source { divergence_deg: if self.of_source { self.full_deg } else { 0.0 }, ..Source::default() },
             detector: Detector {
@@ -102,7 +106,7 @@ impl Case {
         let scan = (Directions::List { wi: vec![self.wi], wo: vec![self.wo] }, Weights::Uniform);
         let of = material(self.kd, KS, self.exponent);
         let lobes = told.then_some(&of);
-        let read = |job: &Job<'_>| Job { accuracy, lobes, ..*job }.run(Control::silent());
+        let read = |job: &Job<'_>| Job { accuracy, order, lobes, ..*job }.run(Control::silent());
         let raw = with_job(&of, &instrument, &scan, 0, &[], read);
         (raw.signal[0], raw.quadrature_error)
     }
@@ -143,6 +147,22 @@ fn a_lobe_much_narrower_than_the_aperture_is_not_missed() {
             assert!(off <= stated + 1e-10, "{exponent:e} {aside}: {off:e} {stated:e}");
             assert!(stated < 1e-3 || exponent > 1e6, "{exponent:e} {aside}: {stated:e}");
         }
+    }
+}
+
+/// Of a smooth lobe, whose logarithm falls by a quarter across the cone, each order is worth at least 20 times the one before.
+#[test]
+fn a_set_order_is_that_of_the_rule_and_says_nothing_of_its_error() {
+    for of_source in [false, true] {
+        let (wi, wo) = (direction(0.7, 0.0), direction(0.68, 3.0));
+        let case = Case { exponent: 400.0, kd: 0.1, wi, wo, full_deg: 3.0, of_source };
+        let errors = [1, 2, 3].map(|order| {
+            let (got, stated) = case.read_with(ACCURACY, Some(order), true);
+            assert!(stated.is_infinite(), "{stated}");
+            (got / case.mean() - 1.0).abs()
+        });
+        println!("orders 1, 2, 3 are off by {errors:?}");
+        assert!(errors[0] > 1e-6 && errors.windows(2).all(|e| e[1] < e[0] / 20.0), "{errors:?}");
     }
 }
 

@@ -34,6 +34,7 @@ pub struct Experiment {
 const ACCURACY: f64 = 1e-4;
 
 /// What one redrawn instrument's intervals hold.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outcome {
     /// Reading by reading: error and σ; nothing where it is masked.
     pub readings: Vec<Option<(f64, f64)>>,
@@ -179,6 +180,11 @@ impl std::fmt::Display for Held {
 /// Redraws instruments of these seeds.
 pub fn coverage(of: &Experiment, seeds: std::ops::Range<u64>) -> Coverage {
     let runs: Vec<Outcome> = seeds.into_par_iter().map(|seed| of.outcome(seed)).collect();
+    coverage_by(of, &runs)
+}
+
+/// What these redrawn instruments say.
+pub fn coverage_by(of: &Experiment, runs: &[Outcome]) -> Coverage {
     let k = normal_quantile(0.975);
     let list: Vec<(f64, f64, usize)> = (0..of.directions.len())
         .filter_map(|i| {

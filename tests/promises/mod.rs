@@ -9,6 +9,7 @@ use goniofit::control::Control;
 use goniofit::fit::FitOptions;
 use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::Measurement;
+use goniofit::tradeoff::chain::ChainSweep;
 use goniofit::tradeoff::fit::FitSweep;
 use goniofit::tradeoff::render::{RenderSweep, Way};
 use goniofit::tradeoff::simulate::SimulateSweep;
@@ -135,30 +136,94 @@ pub fn render_with(scene: &str, sweeps: u64, trials: u32, side: u32, wish: &Wish
     )
 }
 
-/// `simulate --readings`, for parameters.
+/// What of a simulated measurement is turned.
+#[derive(Debug, Clone, Default)]
+struct Turned {
+    readings: Vec<u32>,
+    dwell: Vec<f64>,
+    steps: Vec<f64>,
+}
+
+impl Turned {
+    /// The setting that was advised, alone.
+    fn of(advice: &Advice) -> Self {
+        let size = advice.size.expect("a size");
+        match &advice.curve[..] {
+            "readings averaged" => Self { readings: vec![size as u32], ..Self::default() },
+            "exposure" => Self { dwell: vec![size], ..Self::default() },
+            _ => {
+                let step = advice.setting.rsplit(':').next().expect("a step");
+                Self { steps: vec![step.parse().expect("a number")], ..Self::default() }
+            }
+        }
+    }
+}
+
+/// `simulate`, for parameters: the quickest of all readings, exposures and steps of the scan.
 pub fn simulate(sweeps: u64, trials: u32, step_deg: f64) -> Kept {
     let (source, instrument) =
         (Source::Fitted(Box::new(paint())), Instrument { electrons: 1e4, ..Instrument::default() });
-    let sweep = |readings: Vec<u32>, effort: Effort| {
+    let sweep = |turned: Turned, effort: Effort| {
+        let Turned { readings, dwell, steps } = turned;
         let what = SimulateSweep {
             source: &source,
             name: "paint",
             instrument: &instrument,
             scan: &Scan::Hemisphere { step_deg },
             quadrature: vec![],
+            orders: vec![],
             effects: false,
             readings,
-            dwell: vec![],
-            steps: vec![],
+            dwell,
+            steps,
         };
         goniofit::tradeoff::simulate::sweep(&what, &effort, Control::silent()).expect("measures")
     };
     let wish = Wish::Error(Some("parameters".into()), if step_deg > 10.0 { 2e-3 } else { 5e-4 });
+    let all = Turned {
+        readings: vec![1, 4, 16, 64],
+        dwell: vec![1.0, 4.0, 16.0, 64.0],
+        steps: [2.0, 1.5, 1.0, 0.75].map(|k| k * step_deg).to_vec(),
+    };
+    kept(sweeps, trials, &wish, |seed| sweep(all.clone(), effort(8, seed)), |advice, e| sweep(Turned::of(advice), e))
+}
+
+/// `chain`, for the picture: readings, stride and samples as they were shared out.
+pub fn chain(sweeps: u64, trials: u32, error: f64) -> Kept {
+    let material = paint();
+    let instrument = Instrument { electrons: 300.0, ..Instrument::default() };
+    let stage = Stage::built_in("sphere").expect("built in");
+    let sweep = |readings: Vec<u32>, strides: Vec<usize>, samples: Vec<u32>, effort: Effort| {
+        let what = ChainSweep {
+            material: &material,
+            name: "paint",
+            instrument: &instrument,
+            scan: &Scan::Hemisphere { step_deg: 15.0 },
+            model: "lambert+phong".parse().expect("a model"),
+            stage: &stage,
+            size: (24, 24),
+            readings,
+            strides,
+            samples,
+            budgets: vec![],
+        };
+        let (mut found, _) = goniofit::tradeoff::chain::sweep(&what, &effort, Control::silent()).expect("goes");
+        // The whole comes first.
+        found.curves.rotate_right(1);
+        found
+    };
     kept(
         sweeps,
         trials,
-        &wish,
-        |seed| sweep(vec![1, 4, 16, 64], effort(8, seed)),
-        |advice, e| sweep(vec![advice.size.expect("a size") as u32], e),
+        &Wish::Error(None, error),
+        |seed| sweep(vec![1, 4, 16], vec![1, 3], vec![4, 16, 64], effort(8, seed)),
+        |advice, e| {
+            let number = |option: &str| {
+                let mut words = advice.setting.split(' ').skip_while(|word| *word != option);
+                words.nth(1).expect("a value").parse::<u32>().expect("a number")
+            };
+            let stride = number("--stride") as usize;
+            sweep(vec![number("--readings")], vec![stride], vec![number("--samples")], e)
+        },
     )
 }

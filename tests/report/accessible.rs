@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::browser::page_or_skip;
+use crate::browser::{Page, page_or_skip};
 use crate::run::Run;
 
 /// Every violation as a line.
@@ -102,10 +102,15 @@ fn the_page_passes_the_checks_of_accessibility() {
         page.wait_for("document.querySelector('#viewer').dataset.ready === 'true'");
         let is_dark = page.eval("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)";
         assert_eq!(is_dark, scheme == "dark", "the page follows the scheme");
-        page.eval("document.querySelectorAll('details').forEach((d) => (d.open = true))");
-        for (what, check) in [("structure", STRUCTURE), ("contrast", CONTRAST), ("lines", LINES)] {
-            assert_eq!(page.eval(check), Value::Array(vec![]), "{what}, {scheme}");
-        }
+        passes(&mut page, scheme);
+    }
+}
+
+/// The page passes all checks, with everything unfolded.
+pub fn passes(page: &mut Page, of: &str) {
+    page.eval("document.querySelectorAll('details').forEach((d) => (d.open = true))");
+    for (what, check) in [("structure", STRUCTURE), ("contrast", CONTRAST), ("lines", LINES)] {
+        assert_eq!(page.eval(check), Value::Array(vec![]), "{what}, {of}");
     }
 }
 

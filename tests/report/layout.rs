@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::browser::page_or_skip;
+use crate::browser::{Page, page_or_skip};
 use crate::run::Run;
 
 /// Elements that reach beyond the window and do not lie in something that scrolls or is hidden on purpose.
@@ -16,6 +16,13 @@ const OUTSIDE: &str = "(() => {
     .map(([e, box]) => `${e.tagName}.${e.getAttribute('class')} ${box.left} to ${box.right} of ${width}`);
 })()";
 
+/// Nothing on the page reaches beyond the window.
+pub fn fits(page: &mut Page, what: &str) {
+    let beyond = page.eval("document.scrollingElement.scrollWidth - document.documentElement.clientWidth");
+    assert_eq!(beyond, 0, "{what}: wider than the window");
+    assert_eq!(page.eval(OUTSIDE), Value::Array(vec![]), "{what}");
+}
+
 #[test]
 fn nothing_overflows_at_any_width() {
     let Some(mut page) = page_or_skip("nothing_overflows_at_any_width") else { return };
@@ -25,9 +32,7 @@ fn nothing_overflows_at_any_width() {
         page.wait_for("document.querySelector('#viewer').dataset.ready === 'true'");
         for view in ["slider", "side", "difference"] {
             page.eval(&format!("document.querySelector('[name=view][value={view}]').click()"));
-            let beyond = page.eval("document.scrollingElement.scrollWidth - document.documentElement.clientWidth");
-            assert_eq!(beyond, 0, "{view}: wider than {width} px");
-            assert_eq!(page.eval(OUTSIDE), Value::Array(vec![]), "{view} at {width} px");
+            fits(&mut page, &format!("{view} at {width} px"));
         }
     }
 }

@@ -1,5 +1,7 @@
 //! What loading takes: no network, no errors, little time; and what is left without scripts and on paper.
 
+use std::path::Path;
+
 use serde_json::json;
 
 use crate::browser::{Page, page_or_skip};
@@ -15,17 +17,7 @@ fn the_demos_page_is_small_loads_nothing_and_paints_at_once() {
     page.load(&run.page());
     page.wait_for("document.querySelector('#viewer').dataset.ready === 'true'");
 
-    let asked: Vec<String> = page
-        .events("Network.requestWillBeSent")
-        .iter()
-        .filter_map(|e| e["request"]["url"].as_str().map(str::to_owned))
-        .filter(|url| !url.starts_with("data:"))
-        .collect();
-    assert_eq!(asked, [format!("file://{}", run.page().display())], "the page itself and nothing else");
-    for method in ["Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded"] {
-        let found = page.events(method);
-        assert!(found.is_empty(), "{method}: {found:?}");
-    }
+    loaded_itself_alone(&mut page, &run.page());
     // Other work on the computer can hold up a load, but not five.
     let mut times = vec![first_paint(&mut page)];
     while times.iter().all(|t| *t >= MOST_MS) && times.len() < 5 {
@@ -33,6 +25,21 @@ fn the_demos_page_is_small_loads_nothing_and_paints_at_once() {
         times.push(first_paint(&mut page));
     }
     assert!(times.iter().any(|t| *t < MOST_MS), "first paint after {times:?} ms");
+}
+
+/// The page that was loaded asked for nothing else, and said nothing on the console.
+pub fn loaded_itself_alone(page: &mut Page, file: &Path) {
+    let asked: Vec<String> = page
+        .events("Network.requestWillBeSent")
+        .iter()
+        .filter_map(|e| e["request"]["url"].as_str().map(str::to_owned))
+        .filter(|url| !url.starts_with("data:"))
+        .collect();
+    assert_eq!(asked, [format!("file://{}", file.display())], "the page itself and nothing else");
+    for method in ["Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded"] {
+        let found = page.events(method);
+        assert!(found.is_empty(), "{method}: {found:?}");
+    }
 }
 
 /// Longest time to the first paint, ms.

@@ -9,4 +9,5 @@ mod command;
 mod controls;
 mod layout;
 mod loading;
+mod others;
 mod run;

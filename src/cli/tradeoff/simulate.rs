@@ -1,12 +1,13 @@
 //! `goniofit tradeoff simulate`.
 
 use super::{Common, parse_positive};
+use crate::chain::Source;
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::simulation::{Plan, What};
 use crate::cli::text::option;
 use crate::cli::ui::Ui;
-use crate::gonio::Scan;
+use crate::gonio::{self, Instrument, MOST_ORDER, Scan};
 use crate::tradeoff::simulate::{SimulateSweep, sweep};
 
 #[derive(Debug, clap::Args)]
@@ -17,7 +18,7 @@ use crate::tradeoff::simulate::{SimulateSweep, sweep};
 pub(super) struct Args {
     #[command(flatten)]
     what: What,
-    /// What to turn: readings, exposure and step take the instrument's time, quadrature and effects the computer's
+    /// What to turn: readings, exposure and step take the instrument's time, quadrature, order and effects the computer's
     #[arg(long, value_delimiter = ',', value_name = "KNOB,…", default_value = "readings,exposure,step,quadrature,effects", value_parser = parse_knob)]
     knobs: Vec<&'static str>,
     /// Readings averaged at each pair of directions
@@ -32,11 +33,14 @@ pub(super) struct Args {
     /// Relative errors that means over cones may have, as by `simulate --target-error`
     #[arg(long, value_delimiter = ',', value_name = "E,E,…", default_value = "0.1,0.01,1e-3,1e-4,1e-6,1e-8", value_parser = parse_tolerance)]
     target_errors: Vec<f64>,
+    /// Orders of the rules over cones and spot, for the knob `order`
+    #[arg(long, value_delimiter = ',', value_name = "M,M,…", default_value = "1,2,3,4,6,8", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_ORDER)))]
+    orders: Vec<u32>,
     #[command(flatten)]
     common: Common,
 }
 
-const KNOBS: [&str; 5] = ["readings", "exposure", "step", "quadrature", "effects"];
+const KNOBS: [&str; 6] = ["readings", "exposure", "step", "quadrature", "order", "effects"];
 
 fn parse_knob(text: &str) -> Result<&'static str, String> {
     KNOBS.into_iter().find(|k| *k == text.trim()).ok_or_else(|| format!("known are {}", KNOBS.join(", ")))
@@ -54,8 +58,8 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let on = |knob: &str| args.knobs.contains(&knob);
     let mut steps = list(on("step"), &args.steps);
     steps.sort_by(|a, b| b.total_cmp(a));
-    let has_cones = plan.instrument.detector.aperture_deg + plan.instrument.source.divergence_deg > 0.0;
-    let mut quadrature = list(on("quadrature") && has_cones, &args.target_errors);
+    let has_means = means(&plan.instrument, &source);
+    let mut quadrature = list(on("quadrature") && has_means, &args.target_errors);
     quadrature.sort_by(|a, b| b.total_cmp(a));
     let what = SimulateSweep {
         source: &source,
@@ -63,6 +67,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         instrument: &plan.instrument,
         scan: &plan.scan,
         quadrature,
+        orders: list(on("order") && has_means, &args.orders),
         effects: on("effects"),
         readings: list(on("readings"), &args.average),
         dwell: list(on("exposure") && plan.instrument.is_noisy(), &args.exposures),
@@ -71,6 +76,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let mut found = sweep(&what, &args.common.effort(plan.seed, ui), ui.control())?;
     found.command = command(args, &plan);
     args.common.finish(&found, None, ui)
+}
+
+/// Whether readings are means over a cone or the spot.
+fn means(instrument: &Instrument, source: &Source) -> bool {
+    let of = ["spot extent", "source divergence", "detector aperture"];
+    gonio::plan(instrument, source.channels()).effects.iter().any(|effect| effect.on && of.contains(&effect.name))
 }
 
 /// The command that settings go with.

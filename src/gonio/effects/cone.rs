@@ -73,6 +73,8 @@ pub(in crate::gonio) struct Cones {
     /// Levels that any reading may take; the rest is for those that a peak needs.
     usual: usize,
     accuracy: f64,
+    /// The only one, where it is set.
+    fixed: Option<Rules>,
     dimension: Dimension,
 }
 
@@ -86,7 +88,8 @@ const MOST: usize = 5_000_000;
 impl Cones {
     /// Rules for half angles `source` and `detector` (rad), for means as good as `accuracy` (relative).
     pub fn new(source: f64, detector: f64, accuracy: f64, dimension: Dimension) -> Self {
-        let mut cones = Self { half: [source, detector], rules: Vec::new(), usual: 0, accuracy, dimension };
+        let half = [source, detector];
+        let mut cones = Self { half, rules: Vec::new(), usual: 0, accuracy, fixed: None, dimension };
         let levels = |m: usize, most: usize| {
             (0..usize::BITS as usize).take_while(|level| 1 << level <= m && cones.size(*level) <= most).count()
         };
@@ -96,23 +99,33 @@ impl Cones {
         cones
     }
 
-    /// Orders of both cones' rules at a level: as fine in angle.
-    fn orders(&self, level: usize) -> [usize; 2] {
+    /// The same with one order of the wider cone's rule, and nothing known of what it leaves.
+    pub fn fixed(mut self, order: u32) -> Self {
+        self.fixed = Some(self.made(order));
+        self
+    }
+
+    /// Orders of both cones' rules where the wider one's is `m`: as fine in angle.
+    fn orders(&self, m: u32) -> [usize; 2] {
         let largest = self.half[0].max(self.half[1]);
-        self.half.map(|half| ((f64::from(1u32 << level) * half / largest).ceil() as usize).max(1))
+        self.half.map(|half| ((f64::from(m) * half / largest).ceil() as usize).max(1))
     }
 
     /// Pairs of directions at a level.
     fn size(&self, level: usize) -> usize {
         let one = |m: usize| if self.dimension == Dimension::Flat { 2 * m } else { m * (2 * m + 2) };
         let of = |(m, half): (usize, f64)| if half == 0.0 { 1 } else { one(m) };
-        self.orders(level).into_iter().zip(self.half).map(of).product()
+        self.orders(1 << level).into_iter().zip(self.half).map(of).product()
     }
 
     fn rules(&self, level: usize) -> &Rules {
+        self.rules[level].get_or_init(|| self.made(1 << level))
+    }
+
+    fn made(&self, m: u32) -> Rules {
         let rule = if self.dimension == Dimension::Flat { flat_rule } else { rule };
-        let orders = self.orders(level);
-        self.rules[level].get_or_init(|| [0, 1].map(|k| rule(orders[k], self.half[k])))
+        let orders = self.orders(m);
+        [0, 1].map(|k| rule(orders[k], self.half[k]))
     }
 
     /// Writes the mean of `f`, all channels, over both cones about (wi, wo), and returns by which share it may be off: the largest relative change
@@ -132,6 +145,10 @@ impl Cones {
             return 0.0;
         }
         let about = (frame_about(wi, self.dimension), frame_about(wo, self.dimension));
+        if let Some(rules) = &self.fixed {
+            sum(rules, &about, f, out);
+            return f64::INFINITY;
+        }
         let mut before = vec![0.0; out.len()];
         let last = self.rules.len() - 1;
         let needed = self.peak(wi, wo, self.reach(), f, out).map_or(0, |width| self.level_for(width));
@@ -139,7 +156,7 @@ impl Cones {
         let (first, end) = (needed.min(last.saturating_sub(1)), (needed + 2).max(self.usual - 1).min(last));
         let (mut change, mut earlier) = (f64::INFINITY, f64::INFINITY);
         for level in first..=end {
-            self.sum(level, &about, f, out);
+            sum(self.rules(level), &about, f, out);
             if out.iter().any(|mean| mean.is_nan()) {
                 return 0.0; // not known somewhere within the cones: no order tells it
             }
@@ -157,24 +174,6 @@ impl Cones {
         }
         // A peak between the directions of the finest rule is not known at all.
         if needed > last { change.max(1.0) } else { change }
-    }
-
-    /// The mean by the rules of one level.
-    fn sum(
-        &self,
-        level: usize,
-        about: &(Frame, Frame),
-        f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
-        out: &mut [f64],
-    ) {
-        let [source, detector] = self.rules(level);
-        out.fill(0.0);
-        for (i, w_i) in source {
-            let i = about.0.to_world(*i);
-            for (o, w_o) in detector {
-                f(i, about.1.to_world(*o), w_i * w_o, out);
-            }
-        }
     }
 
     /// How far from the middle both cones see together, rad.
@@ -223,6 +222,22 @@ impl Cones {
     fn level_for(&self, width: f64) -> usize {
         let m = 2.0 * self.half[0].max(self.half[1]) / width;
         m.max(1.0).log2().ceil() as usize
+    }
+}
+
+/// The mean over both cones by these rules.
+fn sum(
+    [source, detector]: &Rules,
+    about: &(Frame, Frame),
+    f: &mut impl FnMut(DVec3, DVec3, f64, &mut [f64]),
+    out: &mut [f64],
+) {
+    out.fill(0.0);
+    for (i, w_i) in source {
+        let i = about.0.to_world(*i);
+        for (o, w_o) in detector {
+            f(i, about.1.to_world(*o), w_i * w_o, out);
+        }
     }
 }
 

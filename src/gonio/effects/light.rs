@@ -36,14 +36,18 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     if source == 0.0 && detector == 0.0 && spot.is_none() {
         return Box::new(light);
     }
-    let cones = |accuracy: f64| Cones::new(source, detector, accuracy, maker.dimension);
+    let cones = |accuracy: f64| {
+        let cones = Cones::new(source, detector, accuracy, maker.dimension);
+        if let Some(order) = maker.order { cones.fixed(order) } else { cones }
+    };
     let late = maker.deadline.map(|deadline| (deadline, cones(COARSEST)));
     // Half of the error is the spot's, half that of what its points see.
     let accuracy = if spot.is_some() { 0.5 * maker.accuracy } else { maker.accuracy };
-    let lobes = Lobes::of(maker, (source, detector), accuracy);
+    let lobes = Lobes::of(maker, (source, detector), accuracy).filter(|_| maker.order.is_none());
     // The coarsest accuracy takes the lowest orders that there are, whatever they leave.
     let kinked = maker.kinked && maker.accuracy < COARSEST;
-    Box::new(Spread { light, cones: cones(accuracy), kinked, spot, accuracy, late, lobes, stop: maker.stop })
+    let order = maker.order.map(|order| order as usize);
+    Box::new(Spread { light, cones: cones(accuracy), kinked, spot, accuracy, order, late, lobes, stop: maker.stop })
 }
 
 /// A truth that is a sum of lobes, of which means over both cones are known without a sum over directions.
@@ -160,6 +164,8 @@ struct Spread<'a> {
     kinked: bool,
     spot: Option<Spot>,
     accuracy: f64,
+    /// The only order, where it is set.
+    order: Option<usize>,
     /// What counts for readings that would be late.
     late: Option<(Deadline, Cones)>,
     lobes: Option<Lobes<'a>>,
@@ -216,7 +222,8 @@ impl Spread<'_> {
         let [mut before, mut of_point, mut off] = [(); 3].map(|()| vec![0.0; out.len()]);
         let how = How { late, is_part: true };
         let (mut evaluations, mut change) = (0, f64::INFINITY);
-        let mut order = if late.is_some() { 1 } else { needed.min(FINEST / 2) };
+        let lowest = if late.is_some() { 1 } else { needed.min(FINEST / 2) };
+        let mut order = self.order.unwrap_or(lowest);
         let first = order;
         let inner = loop {
             out.fill(0.0);
@@ -238,7 +245,7 @@ impl Spread<'_> {
             if out.iter().any(|mean| mean.is_nan()) || self.stop.requested() {
                 return 0.0; // not known at a point of the spot, or not wanted any more
             }
-            let is_good = change <= self.accuracy || late.is_some() && order > first;
+            let is_good = change <= self.accuracy || late.is_some() && order > first || self.order.is_some();
             if is_good || 2 * order > FINEST || order > first && 5 * evaluations > MANY {
                 break inner;
             }

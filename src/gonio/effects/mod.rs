@@ -92,6 +92,8 @@ pub(super) struct Maker<'a> {
     pub seed: u64,
     /// Relative error that quadratures may have.
     pub accuracy: f64,
+    /// The order that they have whatever that leaves, where it is set.
+    pub order: Option<u32>,
     /// Looked at between readings where one takes long.
     pub stop: &'a Stop,
     /// When means over cones have to be done, where that is asked for.

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 use super::flat::{FlatScene, MOST_LOBES};
+use crate::brdf::phong;
 use crate::numeric::lanes::{Lanes, Mask, Vec3};
 use crate::numeric::simd::Simd;
 
@@ -64,7 +65,7 @@ impl<S: Simd> Frames<S> {
 impl FlatScene<'_> {
     /// The materials with these numbers.
     #[inline(always)]
-    pub(super) fn lobes_at<S: Simd>(&self, owner: Lanes<S>) -> LobesAt<S> {
+    pub(super) fn lobes_at<S: Simd, const CLOSED: bool>(&self, owner: Lanes<S>) -> LobesAt<S> {
         let (zero, one) = (owner.number(0.0), owner.number(1.0));
         let none = Vec3::new(zero, zero, zero);
         let nothing = Phong { weight: none, exponent: one, share: zero };
@@ -84,7 +85,7 @@ impl FlatScene<'_> {
             if !material.phong.is_empty() {
                 found.plain = found.plain & !here;
             }
-            if !material.is_closed() {
+            if CLOSED && !material.is_closed() {
                 found.closed = found.closed & !here;
             }
             if material.black {
@@ -118,6 +119,24 @@ fn ln_cos_alpha<S: Simd>(wi: Vec3<S>, wo: Vec3<S>) -> Lanes<S> {
 }
 
 impl<S: Simd> LobesAt<S> {
+    /// With the probabilities of drawing from each lobe for an eye at cosθo = `cos` ([`phong::seen`]).
+    #[inline(always)]
+    pub fn seen_at(mut self, cos: Lanes<S>) -> Self {
+        let number = |x: f64| cos.number(x);
+        let one = number(1.0);
+        let square = cos * cos;
+        let mut sum = self.diffuse_share;
+        for lobe in &mut self.phong[..self.count] {
+            let least = number(phong::SEEN_GRAZING) / (lobe.exponent + number(phong::SEEN_OFFSET));
+            lobe.share = lobe.share * (one - least).mul_add(square, least).sqrt();
+            sum = sum + lobe.share;
+        }
+        let scale = one / sum;
+        self.diffuse_share = self.diffuse_share * scale;
+        self.phong[..self.count].iter_mut().for_each(|lobe| lobe.share = lobe.share * scale);
+        self
+    }
+
     /// Weight of the Lambert lobe.
     #[inline(always)]
     pub fn diffuse(&self) -> Vec3<S> {

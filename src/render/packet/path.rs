@@ -38,10 +38,9 @@ impl<'a> Packets<'a> {
         Self { scene, plan, camera, seed, surround, rules: Rules::default() }
     }
 
-    /// Whether what this light shines on surfaces of most materials has a closed form.
-    #[inline(always)]
-    pub(super) fn is_closed(&self, light: usize) -> bool {
-        self.plan.closed_forms && self.scene.closed[light]
+    /// Whether what any quad shines on surfaces of most materials has a closed form.
+    fn closes(&self) -> bool {
+        self.plan.closed_forms && self.scene.closed.contains(&true)
     }
 
     /// Number of a decision.
@@ -55,14 +54,14 @@ impl<'a> Packets<'a> {
         vectorised(Work { packets: self, tile, done, samples, take })
     }
 
-    /// Follows the paths of a wave to their ends.
+    /// Follows the paths of a wave to their ends; the code for closed forms of quads is there only where some are used.
     #[inline(always)]
-    fn follow<S: Simd>(&self, simd: S, wave: &mut Wave) {
+    fn follow<S: Simd, const CLOSED: bool>(&self, simd: S, wave: &mut Wave) {
         let most = self.plan.events(self.scene.max_bounces);
         for bounce in 0..=most {
             wave.count_rays();
             for group in wave.groups() {
-                self.arrive(simd, group, bounce);
+                self.arrive::<S, CLOSED>(simd, group, bounce);
             }
             wave.close_ranks();
             if wave.running() == 0 {
@@ -72,9 +71,9 @@ impl<'a> Packets<'a> {
             let glossy = if self.scene.lobes > 0 { wave.sort(|owner| self.scene.is_glossy(owner)) } else { 0 };
             for (g, group) in wave.groups().iter_mut().enumerate() {
                 if g * LANES < glossy {
-                    self.shade::<S, true>(simd, group, bounce);
+                    self.shade::<S, true, CLOSED>(simd, group, bounce);
                 } else {
-                    self.shade::<S, false>(simd, group, bounce);
+                    self.shade::<S, false, CLOSED>(simd, group, bounce);
                 }
             }
             wave.close_ranks();
@@ -169,6 +168,13 @@ impl Kernel for Work<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u64 {
+        if self.packets.closes() { self.walk::<S, true>(simd) } else { self.walk::<S, false>(simd) }
+    }
+}
+
+impl Work<'_> {
+    #[inline(always)]
+    fn walk<S: Simd, const CLOSED: bool>(self, simd: S) -> u64 {
         let (packets, tile) = (self.packets, self.tile);
         let paths = tile.width * tile.height * self.samples as usize;
         let mut wave = Wave::new();
@@ -189,7 +195,7 @@ impl Kernel for Work<'_> {
                 }
                 packets.start(simd, group, (Lanes::load(simd, &x), Lanes::load(simd, &y)));
             }
-            packets.follow(simd, &mut wave);
+            packets.follow::<S, CLOSED>(simd, &mut wave);
             for (place, radiance) in places.iter().zip(&wave.found()[..count]) {
                 (self.take)(place.y * TILE + place.x, *radiance);
             }

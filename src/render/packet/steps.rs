@@ -61,7 +61,7 @@ fn weight<S: Simd>(spread: Lanes<S>, other: Lanes<S>) -> Lanes<S> {
 impl Packets<'_> {
     /// Meets surfaces, adds what lights and the environment shine there, and notes who goes on.
     #[inline(always)]
-    pub(super) fn arrive<S: Simd>(&self, simd: S, group: &mut Group, bounce: u32) {
+    pub(super) fn arrive<S: Simd, const CLOSED: bool>(&self, simd: S, group: &mut Group, bounce: u32) {
         let scene = self.scene;
         let t_max = Lanes::splat(simd, f64::INFINITY);
         let rays = Rays { origin: group.get3(simd, Row::Origin), direction: group.get3(simd, Row::Direction), t_max };
@@ -70,7 +70,7 @@ impl Packets<'_> {
         let mut alive = group.says(simd, Row::Alive);
         let mut radiance = group.get3(simd, Row::Radiance);
         let throughput = group.get3(simd, Row::Throughput);
-        let (plain, closed) = (group.says(simd, Row::Plain), group.says(simd, Row::Closed));
+        let plain = group.says(simd, Row::Plain);
         let spread = group.get(simd, Row::Spread);
         if let Some(environment) = scene.environment
             && (bounce == 0 || self.surround.is_none())
@@ -83,8 +83,8 @@ impl Packets<'_> {
         alive = alive & met.hit & zero.above(met.at.normal.dot(rays.direction));
         for (k, light) in scene.shining() {
             let mut found = alive & met.owner.is(zero.number(light_number(k)));
-            if self.is_closed(k) {
-                found = found & !closed;
+            if CLOSED && scene.closed[k] {
+                found = found & !group.says(simd, Row::Closed);
             }
             if found.any() {
                 // The first ray is not weighed: it finds what the eye sees.
@@ -114,15 +114,21 @@ impl Packets<'_> {
 
     /// Adds the light that is found by aiming at it, and draws where the paths go on.
     #[inline(always)]
-    pub(super) fn shade<S: Simd, const GLOSSY: bool>(&self, simd: S, group: &mut Group, bounce: u32) {
+    pub(super) fn shade<S: Simd, const GLOSSY: bool, const CLOSED: bool>(
+        &self,
+        simd: S,
+        group: &mut Group,
+        bounce: u32,
+    ) {
         let at = Points3 {
             position: group.get3(simd, Row::Position),
             error: group.get3(simd, Row::Error),
             normal: group.get3(simd, Row::Normal),
         };
-        let lobes = self.scene.lobes_at(group.get(simd, Row::Owner));
         let frame = Frames::new(at.normal);
         let wo = frame.to_local(-group.get3(simd, Row::Direction));
+        let lobes = self.scene.lobes_at::<S, CLOSED>(group.get(simd, Row::Owner));
+        let lobes = if GLOSSY { lobes.seen_at(wo.z) } else { lobes };
         let mut load = Load {
             alive: group.says(simd, Row::Alive) & wo.z.above(wo.z.number(0.0)) & !lobes.black,
             throughput: group.get3(simd, Row::Throughput),
@@ -131,7 +137,7 @@ impl Packets<'_> {
         };
         let vertices = Vertices { at, frame, wo, lobes };
         let event = Event { packets: self, points: group.points(), bounce };
-        event.add_direct::<S, GLOSSY>(&vertices, &mut load);
+        event.add_direct::<S, GLOSSY, CLOSED>(&vertices, &mut load);
         if bounce + 1 == self.plan.events(self.scene.max_bounces) && !self.plan.chance {
             load.alive = Mask::splat(simd, false);
         }
@@ -142,7 +148,9 @@ impl Packets<'_> {
             group.put3(Row::Throughput, load.throughput);
             group.put(Row::Spread, spread);
             group.note(simd, Row::Plain, vertices.lobes.plain);
-            group.note(simd, Row::Closed, vertices.lobes.closed);
+            if CLOSED {
+                group.note(simd, Row::Closed, vertices.lobes.closed);
+            }
         }
         group.put3(Row::Radiance, load.radiance);
         group.put(Row::Aimed, load.aimed);
@@ -166,7 +174,7 @@ impl Event<'_> {
 
     /// Adds light found by aiming at the lights.
     #[inline(always)]
-    fn add_direct<S: Simd, const GLOSSY: bool>(&self, vertices: &Vertices<S>, load: &mut Load<S>) {
+    fn add_direct<S: Simd, const GLOSSY: bool, const CLOSED: bool>(&self, vertices: &Vertices<S>, load: &mut Load<S>) {
         let scene = self.packets.scene;
         let at = &vertices.at;
         let one = vertices.wo.z.number(1.0);
@@ -185,7 +193,8 @@ impl Event<'_> {
                     (Arrivals { some: load.alive, shadow, strength: one, spread: zero }, *irradiance)
                 }
                 Light::Quad(quad) => {
-                    if self.packets.is_closed(k) {
+                    let is_closed = CLOSED && scene.closed[k];
+                    if is_closed {
                         self.add_closed::<S, GLOSSY>(vertices, quad, load);
                         if !GLOSSY || !(load.alive & !vertices.lobes.closed).any() {
                             continue;
@@ -193,7 +202,7 @@ impl Event<'_> {
                     }
                     let point = self.point(simd, Decision::Light(k as u32));
                     let mut arrivals = from_quad(quad, at, point);
-                    if self.packets.is_closed(k) {
+                    if is_closed {
                         arrivals.some = arrivals.some & !vertices.lobes.closed;
                     }
                     (arrivals, quad.radiance)

@@ -11,10 +11,11 @@ use crate::fit::{FitOptions, fit};
 use crate::gonio::sight::Cones;
 use crate::gonio::{self, Instrument, lit_rows};
 use crate::image::Image;
-use crate::measurement::Dimension;
+use crate::measurement::{Dimension, Measurement};
 use crate::render::{self, Film, Options, Scene};
 use crate::tradeoff::fit::parameter_error;
 use crate::tradeoff::render::accumulate::Truth;
+use crate::tradeoff::simulate::relative_change;
 use crate::tradeoff::sweep::Trial;
 
 /// What is tried.
@@ -40,6 +41,8 @@ pub(super) struct Links<'a> {
     through: Option<Arc<dyn Sight>>,
     truth_scene: Scene,
     truth: Truth,
+    /// What the scan would read without any error.
+    ideal: Vec<f64>,
     said: String,
 }
 
@@ -53,7 +56,8 @@ impl<'a> Links<'a> {
         let half = |k: u64| picture(&truth_scene, what.size, samples, seed.wrapping_add(u64::MAX / 2 + k), control);
         let truth = Truth::of(&half(0)?.to_image(), &half(1)?.to_image());
         let said = truth.said(samples, f64::INFINITY);
-        Ok(Self { what, control, through, truth_scene, truth, said })
+        let ideal = measured(what, &Instrument::noiseless(), 0, control)?.values;
+        Ok(Self { what, control, through, truth_scene, truth, ideal, said })
     }
 
     /// What pictures are measured against.
@@ -79,21 +83,21 @@ impl<'a> Links<'a> {
     pub fn trial(&mut self, what: Try, seed: u64) -> Result<Trial, ChainError> {
         match what {
             Try::Data(readings, stride) => {
-                let (fitted, seconds) = self.fitted(readings, stride, seed)?;
+                let (fitted, seconds, brdf) = self.fitted(readings, stride, seed)?;
                 let shot = |scene: &Scene| picture(scene, self.what.size, SHARED, seed, self.control.quiet());
                 let own = shot(&scene_with(self.what, &fitted)?)?;
                 let error = own.off_by(&shot(&self.truth_scene)?);
-                Ok(Trial { seconds, errors: vec![error, parameter_error(&fitted, self.what.material)] })
+                Ok(Trial { seconds, errors: vec![error, parameter_error(&fitted, self.what.material), brdf] })
             }
             Try::Pixels(samples) => {
                 let film = picture(&self.truth_scene, self.what.size, samples, seed, self.control.quiet())?;
-                Ok(Trial { seconds: film.seconds, errors: vec![self.off(&film.to_image()), f64::NAN] })
+                Ok(Trial { seconds: film.seconds, errors: vec![self.off(&film.to_image()), f64::NAN, f64::NAN] })
             }
             Try::Whole(readings, stride, samples) => {
-                let (fitted, seconds) = self.fitted(readings, stride, seed)?;
+                let (fitted, seconds, brdf) = self.fitted(readings, stride, seed)?;
                 let film =
                     picture(&scene_with(self.what, &fitted)?, self.what.size, samples, seed, self.control.quiet())?;
-                let errors = vec![self.off(&film.to_image()), parameter_error(&fitted, self.what.material)];
+                let errors = vec![self.off(&film.to_image()), parameter_error(&fitted, self.what.material), brdf];
                 Ok(Trial { seconds: seconds + film.seconds, errors })
             }
         }
@@ -104,11 +108,9 @@ impl<'a> Links<'a> {
         self.truth.error(image)
     }
 
-    /// A material measured and fitted, and the time of the fit, s.
-    fn fitted(&self, readings: u32, stride: usize, seed: u64) -> Result<(Material, f64), ChainError> {
-        let source = Source::Fitted(Box::new(self.what.material.clone()));
-        let table =
-            measure(self.what.name, &source, &self.instrument(readings), self.what.scan, seed, self.control.quiet())?;
+    /// A material measured and fitted, the time of the fit, s, and the error of what was measured.
+    fn fitted(&self, readings: u32, stride: usize, seed: u64) -> Result<(Material, f64, f64), ChainError> {
+        let table = measured(self.what, &self.instrument(readings), seed, self.control.quiet())?;
         let options = FitOptions {
             stride,
             draw: seed,
@@ -117,8 +119,18 @@ impl<'a> Links<'a> {
         };
         let clock = Instant::now();
         let fitted = fit(&table, &options)?.material;
-        Ok((fitted, clock.elapsed().as_secs_f64()))
+        Ok((fitted, clock.elapsed().as_secs_f64(), relative_change(&table.values, &self.ideal)))
     }
+}
+
+fn measured(
+    what: &ChainSweep<'_>,
+    instrument: &Instrument,
+    seed: u64,
+    control: Control<'_>,
+) -> Result<Measurement, ChainError> {
+    let source = Source::Fitted(Box::new(what.material.clone()));
+    measure(what.name, &source, instrument, what.scan, seed, control)
 }
 
 fn scene_with(what: &ChainSweep<'_>, material: &Material) -> Result<Scene, ChainError> {

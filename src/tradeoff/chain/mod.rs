@@ -48,12 +48,13 @@ pub struct ChainSweep<'a> {
     pub budgets: Vec<f64>,
 }
 
-const MEASURES: [Measure; 2] = [
+const MEASURES: [Measure; 3] = [
     Measure {
         name: "image",
         what: "relative error of the picture, root of the mean of (x − truth)²/(truth² + (L̄/10)²)",
     },
     Measure { name: "parameters", what: "root mean square of relative errors of fitted weights and shapes" },
+    Measure { name: "brdf", what: "root mean square of relative changes of the reduced BRDF against the truth" },
 ];
 
 const COUNTED: Law = Law { theory: Theory::Exactly(-0.5), why: "noise of independent readings averages out" };
@@ -100,7 +101,7 @@ fn tried(
         knob: Knob::Shares,
         cost: Cost::Instrument,
         main: 0,
-        laws: vec![None; 2],
+        laws: vec![None; 3],
         whole: 0.0,
         advisable: true,
     }];
@@ -136,7 +137,7 @@ fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting
             knob: Knob::Readings,
             cost: Cost::Instrument,
             main: 0,
-            laws: vec![law; 2],
+            laws: vec![law; 3],
             whole: 0.0,
             advisable: false,
         });
@@ -152,7 +153,7 @@ fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting
         knob: Knob::Samples,
         cost: Cost::Computer,
         main: 0,
-        laws: vec![Some(SOBOL), None],
+        laws: vec![Some(SOBOL), None, None],
         whole: 0.0,
         advisable: false,
     });

@@ -21,11 +21,16 @@ use crate::tradeoff::sweep::{Trial, Turn};
 pub(super) enum Read {
     /// Means over cones to this relative error, without noise.
     Quadrature(f64),
+    /// By rules of this order, without noise.
+    Order(u32),
     /// An effect left out; all of them on where it is none.
     Without(Option<&'static str>),
     /// As the instrument reads, noise and all.
     Noisy { instrument: Box<Instrument>, scan: Scan },
 }
+
+/// Relative error that means over cones may have, and the only order of their rules where one is set.
+type Rules = (f64, Option<u32>);
 
 /// Means over cones of the reference.
 const FINEST: f64 = 1e-10;
@@ -108,19 +113,20 @@ impl<'a> Bench<'a> {
 
     pub fn trial(&mut self, read: &Read, turn: Turn) -> Result<Trial, ChainError> {
         match read {
-            Read::Quadrature(accuracy) => self.quadrature(*accuracy, turn.round),
+            Read::Quadrature(accuracy) => self.quadrature((*accuracy, None), turn.round),
+            Read::Order(order) => self.quadrature((ACCURACY, Some(*order)), turn.round),
             Read::Without(name) => self.without(*name, turn.round),
             Read::Noisy { instrument, scan } => self.noisy(instrument, scan, turn.seed),
         }
     }
 
     /// Raw readings, and the time that they took, s.
-    fn read(&self, accuracy: f64, left_out: &[&str], seed: u64) -> Result<(Raw, f64), ChainError> {
+    fn read(&self, (accuracy, order): Rules, left_out: &[&str], seed: u64) -> Result<(Raw, f64), ChainError> {
         let SimulateSweep { source, name, instrument, scan, .. } = self.what;
         let quiet = self.control.quiet();
         with_job(name, source, instrument, scan, seed, quiet, |job| {
             let clock = Instant::now();
-            let raw = Job { accuracy, left_out, ..*job }.run(quiet);
+            let raw = Job { accuracy, order, left_out, ..*job }.run(quiet);
             (raw, clock.elapsed().as_secs_f64())
         })
     }
@@ -130,14 +136,14 @@ impl<'a> Bench<'a> {
         mix(self.seed ^ mix(u64::from(round)))
     }
 
-    fn quadrature(&mut self, accuracy: f64, round: u32) -> Result<Trial, ChainError> {
+    fn quadrature(&mut self, rules: Rules, round: u32) -> Result<Trial, ChainError> {
         let seed = self.instrument_of(round);
         if !self.finest.contains_key(&round) {
-            let (raw, _) = self.read(FINEST, &NOISE, seed)?;
+            let (raw, _) = self.read((FINEST, None), &NOISE, seed)?;
             self.quadrature_error = self.quadrature_error.max(raw.quadrature_error);
             self.finest.insert(round, raw);
         }
-        let (raw, seconds) = self.read(accuracy, &NOISE, seed)?;
+        let (raw, seconds) = self.read(rules, &NOISE, seed)?;
         let error = self.finest.get(&round).map_or(f64::NAN, |finest| of_samples(&raw, finest));
         Ok(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN] })
     }
@@ -148,12 +154,12 @@ impl<'a> Bench<'a> {
         let own = name.filter(|name| NOISE.contains(name));
         let quiet: Vec<&str> = NOISE.into_iter().filter(|noise| Some(*noise) != own).collect();
         if !self.whole.contains_key(&(round, own)) {
-            let (raw, _) = self.read(ACCURACY, &quiet, seed)?;
+            let (raw, _) = self.read((ACCURACY, None), &quiet, seed)?;
             let judged = self.judge(raw)?;
             self.whole.insert((round, own), judged);
         }
         let left_out: Vec<&str> = quiet.iter().copied().chain(name).collect();
-        let (raw, seconds) = self.read(ACCURACY, &left_out, seed)?;
+        let (raw, seconds) = self.read((ACCURACY, None), &left_out, seed)?;
         let less = self.judge(raw)?;
         let Some(all) = self.whole.get(&(round, own)) else { return Ok(Trial { seconds, errors: vec![f64::NAN; 3] }) };
         let parameters =

@@ -29,6 +29,8 @@ pub struct SimulateSweep<'a> {
     pub scan: &'a Scan,
     /// Relative errors that means over cones may have, as by `--target-error`.
     pub quadrature: Vec<f64>,
+    /// Orders of the rules over cones and spot.
+    pub orders: Vec<u32>,
     /// Whether each effect is left out in turn.
     pub effects: bool,
     /// Readings averaged at each pair of directions.
@@ -56,6 +58,10 @@ const MEASURES: [Measure; 3] = [
 
 const COUNTED: Law = Law { theory: Theory::Exactly(-0.5), why: "noise of independent readings averages out" };
 const EXPOSED: Law = Law { theory: Theory::Exactly(-0.5), why: "shot noise; read noise alone would fall as 1/t" };
+const KINKED: Law = Law {
+    theory: Theory::AtMost(-2.0),
+    why: "a table has kinks at its values: each cell that one crosses is off by the cell's square",
+};
 const SAMPLED: Law = Law { theory: Theory::Exactly(-0.5), why: "as many independent readings" };
 
 /// Sweeps the knobs of a simulated measurement.
@@ -83,6 +89,7 @@ fn design(what: &SimulateSweep<'_>) -> (Vec<Series>, Vec<Setting<Read>>) {
     let mut all = Designed { what, series: Vec::new(), settings: Vec::new() };
     all.of_readings();
     all.of_quadrature();
+    all.of_orders();
     all.of_effects();
     (all.series, all.settings)
 }
@@ -102,7 +109,7 @@ impl Designed<'_> {
             main,
             laws,
             whole: 0.0,
-            advisable: knob != Knob::Effects,
+            advisable: !matches!(knob, Knob::Effects | Knob::Order),
         });
     }
 
@@ -162,6 +169,18 @@ impl Designed<'_> {
             if let Some(setting) = self.settings.last_mut() {
                 setting.promise = Some(accuracy);
             }
+        }
+    }
+
+    fn of_orders(&mut self) {
+        if self.what.orders.is_empty() {
+            return;
+        }
+        // Of a smooth material errors fall faster than by any power.
+        let law = Some(KINKED).filter(|_| matches!(self.what.source, Source::Measured(_)));
+        self.begin("order of the rules", Knob::Order, Cost::Computer, 0, vec![law, None, None]);
+        for &order in &self.what.orders {
+            self.push(f64::from(order), Knob::Order.typed(f64::from(order), 0.0), Read::Order(order));
         }
     }
 
