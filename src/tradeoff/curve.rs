@@ -88,7 +88,7 @@ pub struct Point {
     /// Of how many: those in which it can be told.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub judged: Option<usize>,
-    /// Where it stands among the settings that spend the same time for the same measure.
+    /// Where it stands among the settings that spend the same time for the same measure, against the same reference.
     pub standing: Standing,
     /// The trials themselves.
     pub trials: Vec<Trial>,
@@ -226,12 +226,16 @@ fn kept(trials: &[Trial], main: usize, promise: f64, untold: f64) -> (usize, usi
     (told.iter().filter(|met| **met).count(), told.len())
 }
 
-/// Settings compete that spend the same time for the same measure.
+/// Settings compete that spend the same time for the same measure, against the same reference: an effect left out is
+/// off the instrument with all of them, which is off by nothing itself; other knobs are off the truth.
 fn stand<S>(series: &[Series], settings: &[Setting<S>], points: &mut [Option<Point>]) {
-    let class = |i: usize| (series[settings[i].series].cost, series[settings[i].series].main);
-    let of = |i: usize, (cost, main)| {
-        let point = points[i].as_ref().filter(|_| class(i) == (cost, main))?;
-        point.cost(cost).zip(point.errors[main])
+    let class = |i: usize| {
+        let Series { cost, main, knob, .. } = series[settings[i].series];
+        (cost, main, knob == Knob::Effects)
+    };
+    let of = |i: usize, own: (Cost, usize, bool)| {
+        let point = points[i].as_ref().filter(|_| class(i) == own)?;
+        point.cost(own.0).zip(point.errors[own.1])
     };
     let found: Vec<Standing> = (0..settings.len())
         .map(|i| {
@@ -306,5 +310,28 @@ mod tests {
         assert_eq!(kept(&trials, 1, 1.0, f64::INFINITY), (2, 3));
         assert_eq!(kept(&trials, 1, 1.0, 0.9), (3, 4), "it stays below the promise");
         assert_eq!(kept(&trials, 1, 1.0, 1.1), (2, 3), "it may be above");
+    }
+
+    #[test]
+    fn effects_left_out_compete_among_themselves() {
+        let series = [Knob::Quadrature, Knob::Effects].map(|knob| Series {
+            name: knob.axis().into(),
+            knob,
+            cost: Cost::Computer,
+            main: 0,
+            laws: vec![None],
+            whole: 0.0,
+            advisable: true,
+        });
+        // Of each its series, its time and its error: all effects are off by nothing, and quicker than the finest means.
+        let tried = [(0, 1.0, 1e-2), (0, 9.0, 1e-6), (1, 3.0, 0.0), (1, 2.0, 0.1), (1, 4.0, 0.2)];
+        let settings = tried.map(|(series, size, _)| Setting::sized(series, size, size.to_string(), ()));
+        let trial = |(_, seconds, error)| vec![Trial { seconds, errors: vec![error] }; 6];
+        let runs = Runs { trials: tried.map(trial).to_vec(), ended: None };
+        let measures = [Measure { name: "reading", what: "made up" }];
+        let found = curves(&series, &settings, &measures, &runs, &Beside::NOTHING);
+        let standings = found.iter().map(|c| c.points.iter().map(|p| p.standing).collect()).collect::<Vec<Vec<_>>>();
+        let front = Standing::Front;
+        assert_eq!(standings, [vec![front, front], vec![front, front, Standing::Beaten]]);
     }
 }

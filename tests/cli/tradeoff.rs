@@ -115,7 +115,7 @@ fn readings_average_out_and_take_the_instruments_time() {
 fn means_over_cones_are_as_good_as_they_are_asked_for_and_effects_have_their_size() {
     let b = Bench::new();
     let args = typed(
-        "tradeoff simulate --material satin --instrument commercial --scan in-plane:15 --knobs quadrature,effects --trials 2 --target-errors 1e-2,1e-6",
+        "tradeoff simulate --material satin --instrument commercial --scan in-plane:15 --knobs quadrature,effects --trials 2 --target-errors 1e-2,1e-6 --out t",
     );
     let found = b.json(&args);
     let points = curve(&found, "means over cones")["points"].as_array().expect("points");
@@ -130,6 +130,16 @@ fn means_over_cones_are_as_good_as_they_are_asked_for_and_effects_have_their_siz
     let of = |name: &str| readings[names.iter().position(|n| *n == name).expect("an effect")];
     assert_eq!(of("all effects"), 0.0);
     assert!(of("without detector aperture") > 1e-5 && of("without shot noise") > 1e-3, "{names:?} {readings:?}");
+    // What is off all effects is not drawn beside what is off the finest means.
+    let drawn = b.json(&["plot", "tradeoff", "t/tradeoff.json", "--out", "all.svg"]);
+    let plots = drawn["plots"].as_array().expect("plots");
+    let names = |plot: &Value| -> Vec<Value> {
+        plot["curves"].as_array().expect("curves").iter().map(|c| c["name"].clone()).collect()
+    };
+    let effects = Value::from("an effect left out");
+    let with_effects: Vec<&Value> = plots.iter().filter(|plot| names(plot).contains(&effects)).collect();
+    assert!(with_effects.len() == 1 && with_effects[0]["name"] == "reading-effects-time", "{plots:?}");
+    assert_eq!(names(with_effects[0]), [effects]);
 }
 
 #[test]

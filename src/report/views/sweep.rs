@@ -166,29 +166,32 @@ impl Sweep {
         knobs
     }
 
-    /// The main error of all curves against the time that they spend: the computer's, then the instrument's.
+    /// The main error of all curves against the time that they spend: the computer's, then the instrument's. Effects left
+    /// out have a plot of their own, for what they are measured against is another.
     #[must_use]
     pub fn against_time(&self) -> Vec<SweepPlot> {
-        let of = |cost: Cost| {
-            let mut mains: Vec<&str> = Vec::new();
+        let mut groups: Vec<(Cost, &str, bool)> = Vec::new();
+        for cost in [Cost::Computer, Cost::Instrument] {
             for curve in self.curves.iter().filter(|c| c.cost == cost) {
-                if !mains.contains(&curve.main.as_str()) {
-                    mains.push(&curve.main);
+                let group = (cost, curve.main.as_str(), curve.is_of_effects());
+                if !groups.contains(&group) {
+                    groups.push(group);
                 }
             }
-            mains.into_iter().filter_map(move |main| self.of_time(main, cost))
-        };
-        [Cost::Computer, Cost::Instrument].into_iter().flat_map(of).collect()
+        }
+        groups.into_iter().filter_map(|group| self.of_time(group)).collect()
     }
 
-    fn of_time(&self, main: &str, cost: Cost) -> Option<SweepPlot> {
+    fn of_time(&self, (cost, main, of_effects): (Cost, &str, bool)) -> Option<SweepPlot> {
         let measure = self.measures.iter().position(|m| m.name == main)?;
-        let curves = self.curves.iter().filter(|c| c.cost == cost && c.main == main);
+        let own = |c: &&SweepCurve| c.cost == cost && c.main == main && c.is_of_effects() == of_effects;
+        let curves = self.curves.iter().filter(own);
         let time = |p: &Setting| if cost == Cost::Computer { p.seconds.value } else { p.instrument_s };
-        let series = series(curves.map(|c| (c, c.points(measure, time), c.is_of_effects())));
-        let (whose, name) = match cost {
-            Cost::Computer => ("the computer", format!("{main}-time")),
-            Cost::Instrument => ("the instrument", format!("{main}-instrument-time")),
+        let series = series(curves.map(|c| (c, c.points(measure, time), of_effects)));
+        let (whose, name) = match (cost, of_effects) {
+            (Cost::Computer, true) => ("the computer", format!("{main}-effects-time")),
+            (Cost::Computer, false) => ("the computer", format!("{main}-time")),
+            _ => ("the instrument", format!("{main}-instrument-time")),
         };
         self.chart(name, &format!("time of {whose} [s]"), main, series, Vec::new())
     }
