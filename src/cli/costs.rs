@@ -5,6 +5,8 @@ use std::path::Path;
 use super::effects::of_scene;
 use super::failure::Failure;
 use super::output::{make_folder, write_json};
+use super::report::made;
+use super::text::command;
 use super::ui::{self, Ui};
 use crate::brdf::ModelSpec;
 use crate::chain::{self, Demo, Source, Stage};
@@ -67,7 +69,8 @@ fn of_fit(folder: &Path, effort: &Effort, ui: &Ui) -> Result<(), Failure> {
         models: vec![model],
     };
     let found = fit::sweep(&table, &what, effort, ui.control())?;
-    write(&folder.join(OF_FIT), &Sweep { command: format!("goniofit fit {}", file.display()), ..found })
+    let base = command(&["goniofit", "fit", &file.to_string_lossy()], []);
+    write(&folder.join(OF_FIT), &Sweep { commands: vec![base], ..found })
 }
 
 /// Samples of a pixel, against what the picture is off; by the scene's plan, and by the integrator that has everything on.
@@ -86,8 +89,9 @@ fn of_picture(
     };
     let found = render::sweep(stage, Some(subject), &what, effort, ui.control())?;
     let Demo { scene, name, .. } = demo;
-    let command = format!("goniofit render --scene {scene} --material {name} --size {SIDE}x{SIDE} --out OUT.exr");
-    write(&folder.join(OF_PICTURE), &Sweep { command, ..found })
+    let size = format!("{SIDE}x{SIDE}");
+    let base = ["goniofit", "render", "--scene", scene, "--material", name, "--size", &size, "--out", "OUT.exr"];
+    write(&folder.join(OF_PICTURE), &Sweep { commands: vec![command(&base, [])], ..found })
 }
 
 /// What each effect of the scene takes, and by how much the picture is off without it; nothing where it was stopped.
@@ -108,6 +112,7 @@ fn write(folder: &Path, sweep: &Sweep) -> Result<(), Failure> {
         return Ok(());
     }
     make_folder("--out", folder)?;
-    let object = serde_json::to_value(sweep).map_err(|e| Failure::work(e.to_string()))?;
+    let mut object = serde_json::to_value(sweep).map_err(|e| Failure::work(e.to_string()))?;
+    object["run"] = made();
     write_json(&folder.join(SWEEP), &object)
 }

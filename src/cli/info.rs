@@ -40,11 +40,12 @@ impl Reading {
         ReadOptions { format: self.format, quantity: self.quantity, merl_angles: self.merl_angles }
     }
 
-    /// As it was typed, a space before each option.
-    pub(super) fn typed(&self) -> String {
+    /// The words that it was typed in.
+    pub(super) fn typed(&self) -> Vec<String> {
         let angles = self.merl_angles.map(|angles| if angles == MerlAngles::Edge { "edge" } else { "center" });
         let quantity = self.quantity.map(|q| if q == Quantity::BrdfCos { "brdf_cos" } else { "brdf" });
-        option("format", self.format.map(Format::name)) + &option("quantity", quantity) + &option("merl-angles", angles)
+        let format = option("format", self.format.map(Format::name));
+        [format, option("quantity", quantity), option("merl-angles", angles)].concat()
     }
 }
 

@@ -5,9 +5,14 @@ use std::fmt::{Display, Write as _};
 /// Columns that tables keep to, whatever the terminal.
 pub(super) const COLUMNS: usize = 80;
 
-/// An option as it is typed, a space before it; nothing where it was not given.
-pub(super) fn option(name: &str, value: Option<impl Display>) -> String {
-    value.map_or(String::new(), |value| format!(" --{name} {value}"))
+/// An option's words; none where it was not given.
+pub(super) fn option(name: &str, value: Option<impl Display>) -> Vec<String> {
+    value.map_or_else(Vec::new, |value| vec![format!("--{name}"), value.to_string()])
+}
+
+/// A command's words: what it begins with, then its options.
+pub(super) fn command<const N: usize>(begin: &[&str], options: [Vec<String>; N]) -> Vec<String> {
+    begin.iter().map(|word| (*word).to_owned()).chain(options.into_iter().flatten()).collect()
 }
 
 /// Words in lines of at most so many characters; a longer word has its own.

@@ -26,6 +26,12 @@ impl Estimate {
         Self { value, low: 0.0, high: f64::INFINITY }
     }
 
+    /// With something exact on top.
+    #[must_use]
+    pub fn plus(self, more: f64) -> Self {
+        Self { value: self.value + more, low: self.low + more, high: self.high + more }
+    }
+
     /// Whether both ends are known.
     #[must_use]
     pub fn is_bounded(&self) -> bool {

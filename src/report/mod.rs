@@ -7,7 +7,9 @@
 mod page;
 pub mod plot;
 pub mod run;
+mod shell;
 pub mod views;
 mod words;
 
 pub use page::{Written, page};
+pub use shell::typed;

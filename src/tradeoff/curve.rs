@@ -16,8 +16,8 @@ pub struct Sweep {
     pub stage: &'static str,
     /// What was fitted, rendered, measured.
     pub subject: String,
-    /// The command that the settings' options go with.
-    pub command: String,
+    /// The command that the settings' options go with, word by word; of a chain each option's own.
+    pub commands: Vec<Vec<String>>,
     /// The errors, in the order in which points have them.
     pub measures: Vec<Measure>,
     /// The curves.
@@ -122,12 +122,13 @@ impl Slope {
 }
 
 impl Point {
-    /// What the time of a series is, of those two.
+    /// What the time of a series is, of those.
     #[must_use]
     pub fn cost(&self, cost: Cost) -> Option<Estimate> {
         match cost {
             Cost::Computer => Some(self.seconds),
             Cost::Instrument => self.instrument_s.map(Estimate::exact),
+            Cost::Both => self.instrument_s.map(|s| self.seconds.plus(s)),
         }
     }
 }
@@ -263,11 +264,16 @@ fn slope(series: &Series, measures: &[Measure], m: usize, points: &[Point]) -> O
     Some(Slope { measure: measures[m].name, slope, intercept, points: logs.len(), law: series.laws[m] })
 }
 
+/// A command of these words.
+pub(super) fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
+    words.map(str::to_owned).to_vec()
+}
+
 /// The parts of a sweep that only its stage knows.
 pub(super) struct About {
     pub stage: &'static str,
     pub subject: String,
-    pub command: String,
+    pub commands: Vec<Vec<String>>,
     pub reference: Vec<String>,
     pub notes: Vec<String>,
 }
@@ -282,11 +288,11 @@ impl About {
         ended: Option<String>,
         began: std::time::Instant,
     ) -> Sweep {
-        let Self { stage, subject, command, reference, notes } = self;
+        let Self { stage, subject, commands, reference, notes } = self;
         Sweep {
             stage,
             subject,
-            command,
+            commands,
             measures,
             curves,
             reference,

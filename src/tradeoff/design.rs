@@ -21,6 +21,8 @@ pub enum Cost {
     Computer,
     /// The instrument's, known from its description.
     Instrument,
+    /// The instrument's and the computer's, one after the other.
+    Both,
 }
 
 /// A power of the size that an error follows.

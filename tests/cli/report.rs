@@ -219,9 +219,16 @@ fn sweeps_and_effects_in_the_folder_join_the_page() {
     std::fs::create_dir(b.path("d/sweep")).unwrap();
     b.write(
         "d/sweep/tradeoff.json",
-        r#"{"stage": "render", "subject": "cornell", "measures": [{"name": "relmse"}], "curves": [{"name": "independent points", "main": "relmse",
-            "points": [{"seconds": {"value": 0.1, "low": 0.09, "high": 0.11}, "errors": [{"value": 0.2, "low": 0.18, "high": 0.22}]},
-                       {"seconds": {"value": 0.4, "low": 0.39, "high": 0.41}, "errors": [{"value": 0.1, "low": 0.09, "high": null}]}],
+        r#"{"stage": "render", "subject": "cornell", "measures": [{"name": "relmse"}],
+            "commands": [["goniofit", "render", "--scene", "cornell", "--out", "my OUT.exr"]],
+            "run": {"program": "goniofit 9.9", "command": ["goniofit", "tradeoff", "render", "--scene", "cornell", "--out", "my sweep"]},
+            "curves": [{"name": "independent points", "main": "relmse",
+            "points": [{"seconds": {"value": 0.1, "low": 0.09, "high": 0.11}, "errors": [{"value": 0.2, "low": 0.18, "high": 0.22}],
+                        "setting": "--samples 4", "standing": "front", "promise": 0.25, "kept": 7, "judged": 8},
+                       {"seconds": {"value": 0.4, "low": 0.39, "high": 0.41}, "errors": [{"value": 0.1, "low": 0.09, "high": null}],
+                        "setting": "--samples 16", "standing": "undecided"},
+                       {"seconds": {"value": 0.5, "low": 0.49, "high": 0.51}, "errors": [{"value": 0.3, "low": 0.29, "high": 0.31}],
+                        "setting": "--samples 17", "standing": "beaten"}],
             "slopes": [{"measure": "relmse", "slope": {"value": -0.51, "low": -0.55, "high": -0.47},
                         "law": {"theory": {"kind": "exactly", "slope": -0.5}, "why": "independent samples"}}]}]}"#,
     );
@@ -230,4 +237,18 @@ fn sweeps_and_effects_in_the_folder_join_the_page() {
     for part in ["off without it", "render: cornell", "−0.510", "−0.500", "independent samples"] {
         assert!(page.contains(part), "{part}");
     }
+    // The settings of the front with what they promise, each a row that its setting heads; no others.
+    let cell = |text: &str| format!("<td class=\"n\">{text}</td>");
+    let first: String = ["100\u{a0}ms", "relmse 0.2", "0.18 to 0.22", "0.25 in 7 of 8"].map(cell).concat();
+    let second: String = ["400\u{a0}ms", "relmse 0.1", "–", "–"].map(cell).concat();
+    for (mark, samples, cells) in [('*', 4, first), ('~', 16, second)] {
+        let head = format!("<td>{mark}</td><th scope=\"row\">--samples {samples}</th><td>independent points</td>");
+        assert!(page.contains(&(head.clone() + &cells)), "{head}{cells}");
+    }
+    assert!(!page.contains("--samples 17"), "it is beaten");
+    // How it is measured again, as it is typed.
+    let typed = "goniofit tradeoff render --scene cornell --out &#39;my sweep&#39;";
+    assert!(page.contains(&format!("Measured by goniofit 9.9: <code>{typed}</code>")), "{typed}");
+    assert!(page.contains(&format!("<td><code>{typed}</code></td>")), "among the commands");
+    assert!(page.contains("options of: goniofit render --scene cornell --out &#39;my OUT.exr&#39;"));
 }

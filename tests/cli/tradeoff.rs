@@ -72,6 +72,12 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     let csv = b.text("t/tradeoff.csv");
     let rows = csv.lines().filter(|l| !l.starts_with('#')).count();
     assert_eq!(rows, 1 + 5, "{csv}");
+    // How all of it is made again: no more and no less than was typed.
+    let made = format!("goniofit {}: goniofit {}", env!("CARGO_PKG_VERSION"), args.join(" "));
+    assert_eq!(csv.lines().next(), Some(&*format!("# {made}")));
+    let run = &b.json_file("t/tradeoff.json")["run"];
+    let words: Vec<&str> = run["command"].as_array().expect("words").iter().filter_map(Value::as_str).collect();
+    assert_eq!(format!("{}: {}", run["program"].as_str().expect("a name"), words.join(" ")), made);
     let text = b.ok(&[&args[..], &["--advise", "excess=20%"]].concat()).text();
     assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
     assert!(text.contains("goniofit fit paint.csv --model lambert+phong --loss cosine-l2 --part"), "{text}");
@@ -189,8 +195,13 @@ fn the_whole_chain_is_off_by_what_its_links_say() {
 fn advice_can_be_followed() {
     let b = Bench::new();
     // However quick the other ways are, `render` has no option for them.
-    let args = typed("tradeoff render --size 16 --samples 4,16 --trials 3 --ways independent,full,scene --targets 20%");
+    let args = typed(
+        "tradeoff render --material satin --rgb b,g,r --size 16 --samples 4,16 --trials 3 --ways independent,full,scene --targets 20%",
+    );
     let text = b.ok(&[&args[..], &["--advise", "time=10m"]].concat()).text();
+    follow(&b, &text, 1);
+    assert_eq!(b.exr("OUT.exr").width, 16);
+    assert!(text.contains("--material satin --rgb b,g,r --size 16x16"), "{text}");
     let advice = text.rsplit_once("time=10m").expect("advice").1;
     assert!(advice.contains("plan of the scene") || advice.contains("where it is noisy"), "{text}");
     let args = typed(
@@ -198,6 +209,40 @@ fn advice_can_be_followed() {
     );
     let text = b.ok(&[&args[..], &["--advise", "instrument=10h"]].concat()).text();
     assert!(text.contains("--electrons 5000 --scan in-plane:15 --seed 4"), "{text}");
+    follow(&b, &text, 1);
+}
+
+#[test]
+fn advice_of_the_whole_chain_is_the_chains_commands_and_the_instruments_time_is_its_own() {
+    let b = Bench::new();
+    let args = typed(
+        "tradeoff chain --material satin --instrument commercial --scan in-plane:15 --seed 7 --size 16 --average 2 --strides 1,2 --samples 4 --trials 2 --budget 10h --advise instrument=10h",
+    );
+    let text = b.ok(&args).text();
+    assert!(
+        text.contains("whole chain, time shared out    in all         image"),
+        "the time that the whole takes: {text}"
+    );
+    follow(&b, &text, 3);
+    let shared = "--instrument commercial --scan in-plane:15 --seed 7 --out OUT.csv --readings 2";
+    for part in [shared, "goniofit fit OUT.csv --model lambert+phong --through commercial --out OUT.json --stride "] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let picture = b.exr("OUT.exr");
+    assert_eq!((picture.width, picture.metadata.samples, picture.metadata.seed), (16, Some(4), Some(7)));
+    // What the instrument takes is not what the computer takes.
+    let found = b.json(&args);
+    let readings = number(&curve(&found, "readings, all fitted")["points"][0]["instrument_s"]);
+    let whole = &curve(&found, "whole chain, time shared out")["points"][0];
+    assert_eq!(number(&whole["instrument_s"]), readings);
+    assert!(number(&whole["seconds"]["value"]) > 0.0 && number(&whole["size"]) > readings, "{whole}");
+}
+
+/// Runs the commands that advice prints.
+fn follow(b: &Bench, text: &str, commands: usize) {
+    let lines: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("  goniofit ")).collect();
+    assert_eq!(lines.len(), commands, "{text}");
+    lines.into_iter().for_each(|line| _ = b.ok(&typed(line)));
 }
 
 #[test]

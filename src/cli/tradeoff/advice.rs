@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::print::{filled, time};
 use crate::cli::fit::{parse_share, parse_time};
 use crate::cli::ui::significant;
+use crate::report;
 use crate::tradeoff::{Advice, NoAdvice, Sweep, Wish, advise};
 
 /// What was asked for, as it was typed.
@@ -67,21 +68,46 @@ fn one(asked: &Asked, found: &Result<Advice, NoAdvice>, sweep: &Sweep) -> String
     filled(&said, 2) + &typed(advice, sweep)
 }
 
-/// The command line, where the setting is made of options.
+/// The command lines, where the setting is made of options: all of them go with the one command, or one with each of a
+/// chain.
 fn typed(advice: &Advice, sweep: &Sweep) -> String {
     if !advice.setting.starts_with("--") {
         return String::new();
     }
-    // A scan of its own takes the place of the one that was swept.
-    let own = advice.setting.split(' ').next().unwrap_or_default();
-    let words: Vec<&str> = sweep.command.split(' ').collect();
-    let place = words.iter().position(|word| *word == own);
-    let kept = words.iter().enumerate().filter(|(i, _)| place.is_none_or(|p| *i != p && *i != p + 1));
-    let kept: Vec<&str> = kept.map(|(_, word)| *word).collect();
-    format!("  {} {}\n", kept.join(" "), advice.setting)
+    let words: Vec<&str> = advice.setting.split(' ').collect();
+    let each = if sweep.commands.len() > 1 { 2 } else { words.len() };
+    let lines = sweep.commands.iter().zip(words.chunks(each));
+    lines.map(|(command, options)| format!("  {}\n", report::typed(&with(command, options)))).collect()
+}
+
+/// The command with options, the first of which takes the place of what was typed of it: a scan of its own, say.
+fn with<'a>(command: &'a [String], options: &[&'a str]) -> Vec<&'a str> {
+    let place = command.iter().position(|word| options.first() == Some(&word.as_str()));
+    let kept = command.iter().enumerate().filter(|(i, _)| place.is_none_or(|p| *i != p && *i != p + 1));
+    kept.map(|(_, word)| word.as_str()).chain(options.iter().copied()).collect()
 }
 
 /// A number in three digits.
 pub(super) fn short(x: f64) -> String {
     if x == 0.0 || (1e-2..1e4).contains(&x) { significant(x) } else { format!("{x:.2e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(line: &str) -> Vec<String> {
+        line.split('|').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn options_go_with_the_command_that_has_them_and_take_the_place_of_what_was_typed() {
+        let with = |line: &str, option: &[&str]| report::typed(&with(&words(line), option));
+        let base = "goniofit|simulate|my lab.toml|--scan|list:my pairs.csv|--seed|4";
+        assert_eq!(with(base, &["--readings", "2"]), format!("{} --readings 2", report::typed(&words(base))));
+        assert_eq!(
+            with(base, &["--scan", "hemisphere:5"]),
+            "goniofit simulate 'my lab.toml' --seed 4 --scan hemisphere:5"
+        );
+    }
 }

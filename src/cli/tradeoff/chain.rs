@@ -6,15 +6,18 @@ use std::time::Duration;
 use serde_json::json;
 
 use super::print::{filled, time};
-use super::{Common, advice::short};
+use super::{Common, advice::short, simulate};
 use crate::brdf::ModelSpec;
 use crate::chain::{Source, Stage};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_time;
 use crate::cli::render::parse_size;
 use crate::cli::simulation::{Plan, What};
+use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
 use crate::gonio::Scan;
+use crate::gonio::sight::Cones;
+use crate::measurement::Dimension;
 use crate::tradeoff::chain::{ChainSweep, Share, sweep};
 
 #[derive(Debug, clap::Args)]
@@ -79,8 +82,31 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         samples: args.samples.clone(),
         budgets,
     };
-    let (found, shares) = sweep(&what, &args.common.effort(plan.seed, ui), ui.control())?;
+    let (mut found, shares) = sweep(&what, &args.common.effort(plan.seed, ui), ui.control())?;
+    found.commands = base(args, &plan, &what);
     args.common.finish(&found, Some((text(&shares), json!(shares))), ui)
+}
+
+/// The commands that a setting's options go with, one each: what is swept is measured, fitted and rendered.
+fn base(args: &Args, plan: &Plan, what: &ChainSweep<'_>) -> Vec<Vec<String>> {
+    let spec = || args.what.spec.as_ref().map(|spec| spec.display().to_string());
+    // A fit is made through what is no point.
+    let is_seen = plan.scan.dimension() == Dimension::Space && Cones::of(&plan.instrument).is_some();
+    let through = args.what.instrument.clone().or_else(spec).filter(|_| is_seen);
+    let model = option("model", Some(&what.model));
+    let (width, height) = what.size;
+    let picture = [
+        option("scene", Some(&args.scene)),
+        option("material", Some("OUT.json")),
+        option("size", Some(format!("{width}x{height}"))),
+        option("seed", Some(plan.seed)),
+        option("out", Some("OUT.exr")),
+    ];
+    vec![
+        simulate::base(&args.what, plan),
+        command(&["goniofit", "fit", "OUT.csv"], [model, option("through", through), option("out", Some("OUT.json"))]),
+        command(&["goniofit", "render"], picture),
+    ]
 }
 
 /// How each budget is shared out, and what the next second buys.

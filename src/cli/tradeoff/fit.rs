@@ -1,6 +1,5 @@
 //! `goniofit tradeoff fit`.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use super::Common;
@@ -8,6 +7,7 @@ use crate::brdf::ModelSpec;
 use crate::cli::failure::Failure;
 use crate::cli::fit::{parse_loss, parse_share};
 use crate::cli::info::Reading;
+use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
 use crate::fit::{FitOptions, Loss};
 use crate::measurement::formats;
@@ -71,21 +71,16 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     targets.sort_by(|a, b| b.total_cmp(a));
     let what = FitSweep { options, parts, strides, targets, losses, models };
     let mut found = sweep(&table, &what, &args.common.effort(args.seed, ui), ui.control())?;
-    found.command = command(args);
+    found.commands = vec![base(args)];
     args.common.finish(&found, None, ui)
 }
 
 /// The command that settings go with: what is the same in all of them.
-fn command(args: &Args) -> String {
-    let mut text = format!("goniofit fit {}{}", args.file.display(), args.reading.typed());
-    // Writing to a String can't fail.
-    if let [model] = &args.models[..] {
-        let _ = write!(text, " --model {model}");
-    }
-    if let [loss] = &args.losses[..] {
-        let _ = write!(text, " --loss {}", loss.name());
-    }
-    text
+fn base(args: &Args) -> Vec<String> {
+    let model = if let [model] = &args.models[..] { Some(model) } else { None };
+    let loss = if let [loss] = &args.losses[..] { Some(loss.name()) } else { None };
+    let options = [args.reading.typed(), option("model", model), option("loss", loss)];
+    command(&["goniofit", "fit", &args.file.to_string_lossy()], options)
 }
 
 /// Parts of a table of so many directions that are tried where none are asked for, the smallest first.

@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::failure::Failure;
 use super::fit::parse_time;
 use super::output::make_folder;
+use super::report::made;
 use super::ui::{self, Ui};
 use crate::tradeoff::{Effort, Sweep};
 
@@ -46,7 +47,8 @@ struct Common {
     /// Trials of each setting, each with a seed of its own
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     trials: u32,
-    /// Time for all of it (30s, 5m): what would end too late is not begun
+    /// Time for all of it (30s, 5m): a trial is not begun where earlier ones say that it would end too late. References and
+    /// a curve's first trial are not foreseen
     #[arg(long, value_name = "T", value_parser = parse_time)]
     time_budget: Option<Duration>,
     /// The setting for a wanted error (error=1e-3, flip=0.01, …), time (time=2s) or time of the instrument (instrument=30m), with 95 % confidence; may
@@ -81,6 +83,7 @@ impl Common {
         }
         let advice = advice::all(&self.advise, sweep);
         let mut object = serde_json::to_value(sweep).map_err(|e| Failure::work(e.to_string()))?;
+        object["run"] = made();
         object["advice"] = advice::json(&advice);
         let mut text = print::text(sweep);
         if let Some((said, found)) = more {

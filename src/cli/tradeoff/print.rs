@@ -44,7 +44,11 @@ fn table(sweep: &Sweep, curve: &Curve) -> String {
     let shown = |m: &usize| curve.points.iter().any(|p| p.errors[*m].is_some());
     let others: Vec<usize> = (0..sweep.measures.len()).filter(|m| *m != main).filter(shown).collect();
     let first = WIDTH - 2 - 2 * WITH - WITHOUT * others.len();
-    let whose = if curve.cost == Cost::Instrument { "instrument" } else { "time" };
+    let whose = match curve.cost {
+        Cost::Computer => "time",
+        Cost::Instrument => "instrument",
+        Cost::Both => "in all",
+    };
     let fits = curve.name.chars().count() <= first + 2;
     let lead = if fits { String::new() } else { format!("\n{}", curve.name) };
     let name = if fits { &curve.name[..] } else { "" };

@@ -7,7 +7,7 @@ use crate::chain::{self, Stage};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::render::{parse_size, read_stage};
-use crate::cli::text::option;
+use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
 use crate::measurement::ReadOptions;
 use crate::render::Strategy;
@@ -74,10 +74,10 @@ fn parse_way(text: &str) -> Result<Way, String> {
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     args.common.prepare()?;
     let (stage, named) = match (&args.file, &args.scene) {
-        (Some(file), _) => (read_stage(file)?, file.display().to_string()),
+        (Some(file), _) => (read_stage(file)?, vec![file.display().to_string()]),
         (None, name) => {
             let name = name.as_deref().unwrap_or("sphere-on-plane");
-            (Stage::built_in(name)?, format!("--scene {name}"))
+            (Stage::built_in(name)?, option("scene", Some(name)))
         }
     };
     let rgb: Option<[String; 3]> = args.rgb.clone().and_then(|names| names.try_into().ok());
@@ -96,7 +96,18 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let what = RenderSweep { size, samples, targets: args.targets.clone(), ways, reference: args.reference };
     let effort = args.common.effort(args.seed, ui);
     let mut found = sweep(&stage, subject.as_ref(), &what, &effort, ui.control())?;
-    let material = option("material", args.material.as_ref());
-    found.command = format!("goniofit render {named}{material} --size {}x{} --out OUT.exr", size.0, size.1);
+    found.commands = vec![base(args, named, size)];
     args.common.finish(&found, None, ui)
+}
+
+/// The command that settings go with: the scene is `named` so.
+fn base(args: &Args, named: Vec<String>, (width, height): (u32, u32)) -> Vec<String> {
+    let options = [
+        named,
+        option("material", args.material.as_ref()),
+        option("rgb", args.rgb.as_ref().map(|names| names.join(","))),
+        option("size", Some(format!("{width}x{height}"))),
+        option("out", Some("OUT.exr")),
+    ];
+    command(&["goniofit", "render"], options)
 }

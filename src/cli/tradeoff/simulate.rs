@@ -5,7 +5,7 @@ use crate::chain::Source;
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::simulation::{Plan, What};
-use crate::cli::text::option;
+use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
 use crate::gonio::{self, Instrument, MOST_ORDER, Scan};
 use crate::tradeoff::simulate::{SimulateSweep, sweep};
@@ -74,7 +74,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         steps,
     };
     let mut found = sweep(&what, &args.common.effort(plan.seed, ui), ui.control())?;
-    found.command = command(args, &plan);
+    found.commands = vec![base(&args.what, &plan)];
     args.common.finish(&found, None, ui)
 }
 
@@ -85,23 +85,20 @@ fn means(instrument: &Instrument, source: &Source) -> bool {
 }
 
 /// The command that settings go with.
-fn command(args: &Args, plan: &Plan) -> String {
-    let spec = args.what.spec.as_ref().map_or(String::new(), |spec| format!(" {}", spec.display()));
-    let what = &args.what;
-    let instrument = [
+pub(super) fn base(what: &What, plan: &Plan) -> Vec<String> {
+    let options = [
+        what.spec.iter().map(|spec| spec.display().to_string()).collect(),
+        option("material", Some(&plan.material)),
         option("instrument", what.instrument.as_ref()),
         option("electrons", what.electrons),
         option("read-noise", what.read_noise),
         option("readings", what.readings),
-        if what.noiseless { " --noiseless".into() } else { String::new() },
+        what.noiseless.then(|| "--noiseless".to_owned()).into_iter().collect(),
+        option("scan", Some(&plan.scan)),
+        option("seed", Some(plan.seed)),
+        option("out", Some("OUT.csv")),
     ];
-    format!(
-        "goniofit simulate{spec} --material {}{} --scan {} --seed {} --out OUT.csv",
-        plan.material,
-        instrument.concat(),
-        plan.scan,
-        plan.seed
-    )
+    command(&["goniofit", "simulate"], options)
 }
 
 /// The values of a knob that is turned.

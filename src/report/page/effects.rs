@@ -2,11 +2,11 @@
 
 use serde_json::Value;
 
-use super::reproduce::typed;
 use crate::chain::{NOISY_DETECTOR, Stage, scene_plan};
 use crate::control::Plan;
 use crate::gonio::{self, Instrument};
 use crate::report::run::{Kind, Run, RunFit, known_instrument};
+use crate::report::typed;
 use crate::report::views::Predicted;
 use crate::report::words::percent;
 

@@ -18,6 +18,7 @@ use askama::Template;
 
 use super::plot::{DARK, LIGHT, page_css};
 use super::run::{ReportError, Run};
+use super::typed;
 
 /// What a page was made of.
 #[derive(Debug, Clone)]
@@ -115,7 +116,7 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
     let mut missing = Missing::default();
     if let Err(reason) = &run.table {
         let folder = run.folder.display().to_string();
-        let command = reproduce::typed(&["goniofit", "report", &folder, "--measurement", "FILE"]);
+        let command = typed(&["goniofit", "report", &folder, "--measurement", "FILE"]);
         missing.measured = format!("The measurement is not at hand: {reason}. Name it: {command}");
         missing.residuals = "Residuals need the measurement and a fit of it.".into();
     }
@@ -131,13 +132,13 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
         let mut words = vec!["goniofit", "validate", &table];
         words.extend(run.fits.iter().map(|f| reproduce::as_typed(run, &f.file)));
         words.extend(["--out", "DIR", "--report"]);
-        let command = reproduce::typed(&words);
+        let command = typed(&words);
         missing.pictures = format!("There are no pictures here. Render table and fits under the same light: {command}");
     }
     if run.sweeps.is_empty() {
         let folder = run.folder.join("tradeoff").display().to_string();
         let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
-        let command = reproduce::typed(&["goniofit", "tradeoff", "fit", &table, "--out", &folder]);
+        let command = typed(&["goniofit", "tradeoff", "fit", &table, "--out", &folder]);
         missing.tradeoff = format!("How much accuracy another second buys is not measured here: {command}");
     }
     missing

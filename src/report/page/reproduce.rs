@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crate::report::run::{Kind, Run};
+use crate::report::run::{Kind, Made, Run};
+use crate::report::typed;
 
 /// A command and what it makes.
 pub(super) struct Command {
@@ -39,16 +40,6 @@ pub(super) fn as_typed<'a>(run: &Run, file: &'a str) -> &'a str {
     within.and_then(Path::to_str).unwrap_or(file)
 }
 
-/// Words as they are typed in a shell.
-pub(super) fn typed<S: AsRef<str>>(words: &[S]) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+%@".contains(c);
-    let quoted = |word: &S| match word.as_ref() {
-        word if !word.is_empty() && word.chars().all(plain) => word.to_owned(),
-        word => format!("'{}'", word.replace('\'', r"'\''")),
-    };
-    words.iter().map(quoted).collect::<Vec<_>>().join(" ")
-}
-
 fn commands(run: &Run) -> Vec<Command> {
     let mut list = Vec::new();
     let mut push = |makes: &str, words: &[&str]| {
@@ -77,6 +68,11 @@ fn commands(run: &Run) -> Vec<Command> {
         }
     }
     for sweep in run.sweeps.iter().filter(|sweep| !sweep.file.as_os_str().is_empty()) {
+        // The run's own command stands above.
+        let made = Made::of(&sweep.run).command;
+        if !made.is_empty() && made != run.made.command {
+            push("what accuracy costs", &made.iter().map(String::as_str).collect::<Vec<_>>());
+        }
         push(
             "curves of accuracy against time",
             &["goniofit", "plot", "tradeoff", &sweep.file.display().to_string(), "--out", "curves.svg"],
@@ -87,15 +83,4 @@ fn commands(run: &Run) -> Vec<Command> {
         push("this page", &["goniofit", "report", &folder]);
     }
     list
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_where_a_shell_would_split_them() {
-        let words = ["goniofit", "fit", "my lab.csv", "it's", "a+b.json"];
-        assert_eq!(typed(&words), r"goniofit fit 'my lab.csv' 'it'\''s' a+b.json");
-    }
 }

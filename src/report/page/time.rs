@@ -2,9 +2,10 @@
 
 use crate::control::counted;
 use crate::report::plot::{Heading, LogLog, Marks, Point, Series, minus};
-use crate::report::run::Run;
-use crate::report::views::{self, SweepSlope};
-use crate::report::words::{count, number, percent, time as told};
+use crate::report::run::{Made, Run};
+use crate::report::typed;
+use crate::report::views::{self, FrontSetting, Interval, SweepSlope};
+use crate::report::words::{count, digits, number, percent, time as told};
 
 /// A stage and its time.
 pub(super) struct Stage {
@@ -33,9 +34,23 @@ pub(super) struct Sweep {
     pub title: String,
     /// How it was measured, and what else one must know.
     pub said: String,
+    /// The program and the command that made it, where they are known.
+    pub made: Option<(String, String)>,
     /// Charts of error against time and size, with what they show.
     pub charts: Vec<(String, String)>,
+    pub front: Vec<FrontRow>,
     pub slopes: Vec<SlopeRow>,
+}
+
+/// A setting that no other beats.
+pub(super) struct FrontRow {
+    pub mark: char,
+    pub setting: String,
+    pub curve: String,
+    pub time: String,
+    pub error: String,
+    pub interval: String,
+    pub promise: String,
 }
 
 /// A slope beside that of theory.
@@ -95,14 +110,37 @@ fn sweep(found: &views::Sweep) -> Sweep {
     let chart = |plot: views::SweepPlot| (format!("{}; bars are 95 % intervals.", plot.shows), plot.figure.inline());
     let slopes = found.curves.iter().flat_map(|c| c.slopes.iter().filter_map(|s| slope(&c.name, s)));
     let trials = format!("{} of each setting, seed {}", counted(found.trials.into(), "trial"), found.seed);
-    let settings = (!found.command.is_empty()).then(|| format!("settings are options of: {}", found.command));
+    let commands: Vec<String> = found.commands.iter().map(|words| typed(words)).collect();
+    let settings = (!commands.is_empty()).then(|| format!("settings are options of: {}", commands.join(" && ")));
     let said = std::iter::once(trials).chain(settings).chain(found.reference.clone()).chain(found.notes.clone());
     let said = said.map(|line| sentence(&line));
     Sweep {
         title: format!("{}: {}", found.stage, found.subject),
         said: said.collect::<Vec<_>>().join(" "),
+        made: made(&Made::of(&found.run)),
+        front: found.front().iter().map(front).collect(),
         charts: found.against_time().into_iter().chain(found.beside_theory()).map(chart).collect(),
         slopes: slopes.collect(),
+    }
+}
+
+fn made(made: &Made) -> Option<(String, String)> {
+    made.program.clone().filter(|_| !made.command.is_empty()).map(|program| (program, typed(&made.command)))
+}
+
+/// A setting of the Pareto front.
+fn front(found: &FrontSetting<'_>) -> FrontRow {
+    let three = |x: Option<f64>| x.map_or_else(|| "–".into(), |x| digits(x, 3));
+    let Interval { value, low, high } = found.error;
+    let kept = |(most, kept, of): (f64, usize, usize)| format!("{} in {kept} of {of}", number(most));
+    FrontRow {
+        mark: if found.is_undecided { '~' } else { '*' },
+        setting: found.setting.into(),
+        curve: found.curve.into(),
+        time: found.seconds.map_or_else(|| "–".into(), told),
+        error: format!("{} {}", found.measure, three(value)),
+        interval: low.zip(high).map_or_else(|| "–".into(), |_| format!("{} to {}", three(low), three(high))),
+        promise: found.promise.map_or_else(|| "–".into(), kept),
     }
 }
 

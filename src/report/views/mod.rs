@@ -14,4 +14,4 @@ pub use peak::{Peak, peak};
 pub use predict::Predicted;
 pub use residuals::{Binned, ResidualMaps, Statistic, residual_figure, residual_maps, residual_range};
 pub use slices::{Curve, Shown, Slice, default_channel, incidences, polar_figure, scale_of, slice, slice_figure};
-pub use sweep::{Interval, Law, Sweep, SweepCurve, SweepPlot, SweepSlope};
+pub use sweep::{FrontSetting, Interval, Law, Sweep, SweepCurve, SweepPlot, SweepSlope};

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope, minus};
 
@@ -19,9 +20,12 @@ pub struct Sweep {
     /// Where it was read.
     #[serde(skip)]
     pub file: PathBuf,
-    /// The command that the settings go with; none where there is none.
+    /// The command that the settings' options go with, word by word; of a chain each option's own.
     #[serde(default)]
-    pub command: String,
+    pub commands: Vec<Vec<String>>,
+    /// How it was asked for, as `run` in `numbers.json` says it; null where that is not known.
+    #[serde(default)]
+    pub run: Value,
     /// What errors are measured against, and how good that is.
     #[serde(default)]
     pub reference: Vec<String>,
@@ -66,14 +70,61 @@ enum Cost {
     #[default]
     Computer,
     Instrument,
+    /// One after the other.
+    Both,
+}
+
+impl Cost {
+    /// Whose time a plot has on its axis: of both the instrument's, for that is by far the longer one.
+    fn axis(self) -> Self {
+        if self == Self::Both { Self::Instrument } else { self }
+    }
 }
 
 #[derive(Debug, Clone, Deserialize)]
 struct Setting {
+    /// How it is typed.
+    #[serde(default)]
+    setting: String,
     size: Option<f64>,
     seconds: Interval,
     instrument_s: Option<f64>,
     errors: Vec<Option<Interval>>,
+    promise: Option<f64>,
+    kept: Option<usize>,
+    judged: Option<usize>,
+    #[serde(default)]
+    standing: Standing,
+}
+
+/// Where a setting stands among its rivals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Standing {
+    Front,
+    Undecided,
+    Beaten,
+    #[default]
+    Unknown,
+}
+
+/// A setting that no other beats in both time and error.
+#[derive(Debug, Clone, Copy)]
+pub struct FrontSetting<'a> {
+    /// Whether one does, within the 95 % intervals.
+    pub is_undecided: bool,
+    /// The curve that it is on.
+    pub curve: &'a str,
+    /// How it is typed.
+    pub setting: &'a str,
+    /// What it takes of the time that its curve spends, s.
+    pub seconds: Option<f64>,
+    /// Name of the error.
+    pub measure: &'a str,
+    /// The error.
+    pub error: Interval,
+    /// What it promises of that, in how many trials that was kept, and of how many.
+    pub promise: Option<(f64, usize, usize)>,
 }
 
 /// A value with its 95 % interval; an end that is not known is none.
@@ -156,6 +207,30 @@ impl Sweep {
         self.knobs().into_iter().flat_map(of).collect()
     }
 
+    /// The settings of the Pareto front, curve by curve, and those of which it is undecided.
+    #[must_use]
+    pub fn front(&self) -> Vec<FrontSetting<'_>> {
+        self.curves.iter().flat_map(|curve| curve.points.iter().filter_map(|p| self.on_front(curve, p))).collect()
+    }
+
+    fn on_front<'a>(&'a self, curve: &'a SweepCurve, point: &'a Setting) -> Option<FrontSetting<'a>> {
+        let is_undecided = match point.standing {
+            Standing::Front => false,
+            Standing::Undecided => true,
+            Standing::Beaten | Standing::Unknown => return None,
+        };
+        let measure = self.measures.iter().position(|m| m.name == curve.main)?;
+        Some(FrontSetting {
+            is_undecided,
+            curve: &curve.name,
+            setting: &point.setting,
+            seconds: point.time(curve.cost),
+            measure: &curve.main,
+            error: point.errors.get(measure).copied().flatten()?,
+            promise: point.promise.zip(point.kept).zip(point.judged).map(|((most, kept), of)| (most, kept, of)),
+        })
+    }
+
     fn knobs(&self) -> Vec<&str> {
         let mut knobs: Vec<&str> = Vec::new();
         for curve in self.curves.iter().filter(|c| !c.is_of_effects()) {
@@ -172,7 +247,7 @@ impl Sweep {
     pub fn against_time(&self) -> Vec<SweepPlot> {
         let mut groups: Vec<(Cost, &str, bool)> = Vec::new();
         for cost in [Cost::Computer, Cost::Instrument] {
-            for curve in self.curves.iter().filter(|c| c.cost == cost) {
+            for curve in self.curves.iter().filter(|c| c.cost.axis() == cost) {
                 let group = (cost, curve.main.as_str(), curve.is_of_effects());
                 if !groups.contains(&group) {
                     groups.push(group);
@@ -184,9 +259,9 @@ impl Sweep {
 
     fn of_time(&self, (cost, main, of_effects): (Cost, &str, bool)) -> Option<SweepPlot> {
         let measure = self.measures.iter().position(|m| m.name == main)?;
-        let own = |c: &&SweepCurve| c.cost == cost && c.main == main && c.is_of_effects() == of_effects;
+        let own = |c: &&SweepCurve| c.cost.axis() == cost && c.main == main && c.is_of_effects() == of_effects;
         let curves = self.curves.iter().filter(own);
-        let time = |p: &Setting| if cost == Cost::Computer { p.seconds.value } else { p.instrument_s };
+        let time = |p: &Setting| p.time(cost);
         let series = series(curves.map(|c| (c, c.points(measure, time), of_effects)));
         let (whose, name) = match (cost, of_effects) {
             (Cost::Computer, true) => ("the computer", format!("{main}-effects-time")),
@@ -232,6 +307,17 @@ impl Sweep {
         };
         let shows = format!("{y} against {}", x.trim_end_matches(" [s]"));
         Some(SweepPlot { name, shows, figure: chart.figure(), series: chart.series })
+    }
+}
+
+impl Setting {
+    /// What of its time is spent, s.
+    fn time(&self, cost: Cost) -> Option<f64> {
+        match cost {
+            Cost::Computer => self.seconds.value,
+            Cost::Instrument => self.instrument_s,
+            Cost::Both => Some(self.seconds.value? + self.instrument_s?),
+        }
     }
 }
 

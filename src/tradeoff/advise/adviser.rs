@@ -5,6 +5,7 @@ use super::{Advice, Wish};
 use crate::numeric::estimate::Estimate;
 use crate::numeric::line::Line;
 use crate::tradeoff::curve::{Curve, Point, Sweep};
+use crate::tradeoff::design::Cost;
 
 /// Sizes beyond the last that was measured: up to so many times it.
 const BEYOND: f64 = 8.0;
@@ -60,6 +61,17 @@ impl<'a> Adviser<'a> {
             meets(a.error.at_most / slack, a.seconds.at_most / slack, a.instrument_s.map(|s| s / slack), wish)
         });
         all
+    }
+
+    /// What one setting is taken before another for: the time that it spends, or its error where the time is wished for.
+    pub(super) fn price(&self, advice: &Advice, wish: &Wish) -> f64 {
+        let instrument_s = advice.instrument_s.unwrap_or(f64::INFINITY);
+        match (wish, self.curve.cost) {
+            (Wish::Error(..), Cost::Computer) => advice.seconds.expected,
+            (Wish::Error(..), Cost::Instrument) => instrument_s,
+            (Wish::Error(..), Cost::Both) => instrument_s + advice.seconds.expected,
+            _ => advice.error.at_most,
+        }
     }
 
     fn of(&self, known: &Known<'_>) -> Advice {

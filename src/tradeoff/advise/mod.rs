@@ -88,19 +88,17 @@ pub fn advise(sweep: &Sweep, wish: &Wish) -> Result<Advice, NoAdvice> {
     let wants_instrument = match wish {
         Wish::InstrumentTime(_) => true,
         Wish::Time(_) => false,
-        Wish::Error(..) => curves.first().is_some_and(|c| c.cost == Cost::Instrument),
+        Wish::Error(..) => curves.first().is_some_and(|c| c.cost != Cost::Computer),
     };
     let advisers: Vec<Adviser<'_>> = curves
         .iter()
-        .filter(|curve| (curve.cost == Cost::Instrument) == wants_instrument)
+        .filter(|curve| (curve.cost != Cost::Computer) == wants_instrument)
         .filter_map(|curve| Some(Adviser::new(sweep, curve, named.or_else(|| sweep.measure(curve.main))?)))
         .collect();
-    let price = |a: &Advice| match (wish, wants_instrument) {
-        (Wish::Error(..), true) => a.instrument_s.unwrap_or(f64::INFINITY),
-        (Wish::Error(..), false) => a.seconds.expected,
-        _ => a.error.at_most,
+    let priced = |adviser: &Adviser<'_>| {
+        adviser.candidates(wish).into_iter().map(|a| (adviser.price(&a, wish), a)).collect::<Vec<_>>()
     };
-    let all = advisers.iter().flat_map(|adviser| adviser.candidates(wish));
+    let all = advisers.iter().flat_map(priced);
     let other = if curves.is_empty() {
         "no setting of the whole was tried"
     } else if wants_instrument {
@@ -108,7 +106,8 @@ pub fn advise(sweep: &Sweep, wish: &Wish) -> Result<Advice, NoAdvice> {
     } else {
         "its settings take the instrument's time: ask for instrument=T"
     };
-    all.min_by(|a, b| price(a).total_cmp(&price(b))).ok_or_else(|| out_of_reach(&advisers, wish, other))
+    let best = all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, advice)| advice);
+    best.ok_or_else(|| out_of_reach(&advisers, wish, other))
 }
 
 /// `other` says why nothing was tried.

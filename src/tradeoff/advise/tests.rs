@@ -34,13 +34,8 @@ fn sweep_of(seed: u64) -> Sweep {
     let runs = run::<_, ()>(&settings, &effort, control, |i, turn| Ok(made_up(sizes[i], turn.seed))).expect("runs");
     let measures = vec![Measure { name: "error", what: "made up" }];
     let curves = curve::curves(&[series], &settings, &measures, &runs, &curve::Beside::NOTHING);
-    let about = curve::About {
-        stage: "render",
-        subject: String::new(),
-        command: String::new(),
-        reference: vec![],
-        notes: vec![],
-    };
+    let about =
+        curve::About { stage: "render", subject: String::new(), commands: vec![], reference: vec![], notes: vec![] };
     about.sweep(measures, curves, &effort, None, std::time::Instant::now())
 }
 

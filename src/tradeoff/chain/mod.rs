@@ -81,7 +81,7 @@ pub fn sweep(what: &ChainSweep<'_>, effort: &Effort, control: Control<'_>) -> Re
     let about = About {
         stage: "chain",
         subject: format!("{} along {} into {}", what.name, what.scan, what.stage.spec.name),
-        command: String::new(),
+        commands: Vec::new(),
         reference: vec![links.said()],
         notes,
     };
@@ -99,7 +99,7 @@ fn tried(
     let series = [Series {
         name,
         knob: Knob::Shares,
-        cost: Cost::Instrument,
+        cost: Cost::Both,
         main: 0,
         laws: vec![None; 3],
         whole: 0.0,
@@ -108,7 +108,7 @@ fn tried(
     let settings: Vec<Setting<Try>> = shares
         .iter()
         .map(|s| Setting {
-            instrument_s: Some(s.seconds()),
+            instrument_s: Some(s.instrument_s),
             ..Setting::sized(0, s.seconds(), s.typed(), Try::Whole(s.readings, s.stride, s.samples))
         })
         .collect();

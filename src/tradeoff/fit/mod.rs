@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use super::curve::{About, Beside, Sweep, curves};
+use super::curve::{About, Beside, Sweep, curves, words};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::sweep::{Effort, Trial, run};
@@ -88,7 +88,7 @@ pub fn sweep(
     let about = About {
         stage: "fit",
         subject: format!("{}, {} directions", measurement.name, measurement.len()),
-        command: format!("goniofit fit {}", measurement.name),
+        commands: vec![words(["goniofit", "fit", &measurement.name])],
         reference: yardstick.said(),
         notes: notes(what),
     };

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::curve::{About, Beside, Sweep, curves};
+use super::curve::{About, Beside, Sweep, curves, words};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::sweep::{Effort, Trial, run};
@@ -153,7 +153,14 @@ pub fn sweep(
     let about = About {
         stage: "render",
         subject: format!("{}, {width}×{height}", stage.spec.name),
-        command: format!("goniofit render --scene {} --size {width}x{height}", stage.spec.name),
+        commands: vec![words([
+            "goniofit",
+            "render",
+            "--scene",
+            &stage.spec.name,
+            "--size",
+            &format!("{width}x{height}"),
+        ])],
         reference: vec![truth.said(half, smallest)],
         notes: notes(&runs.trials, truth.untold()),
     };

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::curve::{About, Beside, Sweep, curves};
+use super::curve::{About, Beside, Sweep, curves, words};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::sweep::{Effort, run};
@@ -77,7 +77,7 @@ pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) ->
     let about = About {
         stage: "simulate",
         subject: format!("{} along {}", what.name, what.scan),
-        command: format!("goniofit simulate --material {} --scan {}", what.name, what.scan),
+        commands: vec![words(["goniofit", "simulate", "--material", what.name, "--scan", &what.scan.to_string()])],
         reference: bench.said(),
         notes: bench.notes(),
     };
