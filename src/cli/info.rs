@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::failure::Failure;
-use super::text::option;
+use super::text::{COLUMNS, indented, option};
 use super::ui::Ui;
 use crate::chain::{self, Scatter};
 use crate::control::counted;
@@ -82,66 +82,93 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Where what is said of a measurement begins, behind its names.
+const COLUMN: usize = 16;
+
 fn describe(s: &Summary, scatter: &Result<Vec<Scatter>, String>) -> String {
-    let mut t = String::new();
-    let unit = if s.dimension == 2 { "1/rad" } else { "1/sr" };
-    let _ = writeln!(t, "{}: {}", s.name, s.origin);
-    let _ = writeln!(t, "  entries       {} direction pairs, {} at or below the horizon", s.entries, s.below_horizon);
-    let _ = writeln!(t, "  valid values  {} ({:.1} %)", s.valid, 100.0 * s.valid_share);
+    let mut t = format!("{}\n", indented(&format!("{}: {}", s.name, s.origin), 2));
+    let pairs = counted(s.entries as u64, "direction pair");
+    fact(&mut t, "entries", &format!("{pairs}, {} at or below the horizon", s.below_horizon));
+    fact(&mut t, "valid values", &format!("{} ({:.1} %)", s.valid, 100.0 * s.valid_share));
+    masked(&mut t, s);
+    let range = |r: Option<(f64, f64)>| r.map_or("none".into(), |(a, b)| format!("{a:.2}° to {b:.2}°"));
+    fact(&mut t, "θi", &range(s.theta_i_deg));
+    if let Some(list) = &s.incidences_deg {
+        let angles: Vec<String> = list.iter().map(|a| format!("{}°", (a * 100.0).round() / 100.0)).collect();
+        fact(&mut t, "incidences", &angles.join(", "));
+    }
+    fact(&mut t, "θo", &range(s.theta_o_deg));
+    fact(&mut t, "weights", s.weights);
+    channels(&mut t, s);
+    let reciprocity = s.reciprocity.as_ref().map_or("no swapped pairs to compare".into(), |r| {
+        let percent = 100.0 * r.median_relative_difference;
+        format!("median difference {percent:.2} % over {} swapped values", r.pairs)
+    });
+    fact(&mut t, "reciprocity", &reciprocity);
+    for (theta, value) in &s.stated_scatter {
+        fact(&mut t, "stated", &format!("integrated scatter {value} at θi {theta}°"));
+    }
+    match scatter {
+        Ok(list) => scattered(&mut t, s, list),
+        Err(reason) => fact(&mut t, "scatter", &format!("not integrated: {reason}")),
+    }
+    for note in &s.notes {
+        let _ = writeln!(t, "  note: {}", indented(note, 8));
+    }
+    t
+}
+
+/// A line of the summary, and more where it takes them.
+fn fact(t: &mut String, name: &str, said: &str) {
+    // Writing to a String can't fail.
+    let _ = writeln!(t, "  {name:14}{}", indented(said, COLUMN));
+}
+
+/// Values that are left out, and why.
+fn masked(t: &mut String, s: &Summary) {
     if s.masked.total() > 0 {
         let first = s.masked.first_not_finite.as_ref().map_or(String::new(), |p| format!(", the first at {p}"));
-        let _ =
-            writeln!(t, "  masked        {} not measured, {} not finite{first}", s.masked.marked, s.masked.not_finite);
+        let said = format!("{} not measured, {} not finite{first}", s.masked.marked, s.masked.not_finite);
+        fact(t, "masked", &said);
     }
     for (reason, pairs) in &s.mask_reasons {
         let _ = writeln!(t, "    {:11} {}", reason.name(), counted(*pairs as u64, "pair"));
     }
-    let range = |r: Option<(f64, f64)>| r.map_or("none".into(), |(a, b)| format!("{a:.2}° to {b:.2}°"));
-    let _ = writeln!(t, "  θi            {}", range(s.theta_i_deg));
-    if let Some(list) = &s.incidences_deg {
-        let angles: Vec<String> = list.iter().map(|a| format!("{}°", (a * 100.0).round() / 100.0)).collect();
-        let _ = writeln!(t, "  incidences    {}", angles.join(", "));
-    }
-    let _ = writeln!(t, "  θo            {}", range(s.theta_o_deg));
-    let _ = writeln!(t, "  weights       {}", s.weights);
-    let _ = writeln!(t, "  channel       {:>12} {:>12} {:>9} {:>9}  [{unit}]", "min", "max", "decades", "negative");
+}
+
+/// A line a channel; σ where any has one.
+fn channels(t: &mut String, s: &Summary) {
+    let unit = if s.dimension == 2 { "1/rad" } else { "1/sr" };
+    let has_sigma = s.channels.iter().any(|c| c.median_relative_sigma.is_some());
+    let sigma = if has_sigma { "median σ" } else { "" };
+    let mut line = |name: &str, [min, max, decades, negative, sigma]: [&str; 5]| {
+        let row = format!("  {name:15}{min:>12} {max:>12} {decades:>8} {negative:>9} {sigma:>10}");
+        let _ = writeln!(t, "{}", row.trim_end());
+    };
+    line(&format!("channel [{unit}]"), ["min", "max", "decades", "negative", sigma]);
     for c in &s.channels {
         let number = |v: Option<f64>| v.map_or("–".into(), |v| format!("{v:.5}"));
         let decades = c.dynamic_range_decades.map_or("–".into(), |d| format!("{d:.1}"));
-        let _ = write!(t, "  {:13} {:>12} {:>12} {decades:>9} {:>9}", c.name, number(c.min), number(c.max), c.negative);
-        let _ = match c.median_relative_sigma {
-            Some(r) => writeln!(t, "  σ {:.2} % (median)", 100.0 * r),
-            None => writeln!(t),
-        };
+        let sigma = c.median_relative_sigma.map_or(String::new(), |r| format!("{:.2} %", 100.0 * r));
+        line(&c.name, [&number(c.min), &number(c.max), &decades, &c.negative.to_string(), &sigma]);
     }
-    match &s.reciprocity {
-        Some(r) => {
-            let percent = 100.0 * r.median_relative_difference;
-            let _ = writeln!(t, "  reciprocity   median difference {percent:.2} % over {} swapped values", r.pairs);
-        }
-        None => t.push_str("  reciprocity   no swapped pairs to compare\n"),
-    }
-    for (theta, value) in &s.stated_scatter {
-        let _ = writeln!(t, "  stated        integrated scatter {value} at θi {theta}°");
-    }
-    match scatter {
-        Ok(list) => {
-            let names: Vec<String> = s.channels.iter().map(|c| format!("{:>8}", c.name)).collect();
-            let _ = writeln!(t, "  scatter       ∫ f cosθo dωo over what was measured  {}", names.join(" "));
-            for row in list {
-                let values: Vec<String> = row.scatter.iter().map(|v| format!("{v:>8.4}")).collect();
-                let covered = 100.0 * row.covered;
-                let (theta, values) = (row.theta_i_deg, values.join(" "));
-                let _ =
-                    writeln!(t, "                θi {theta:>5.1}°, {covered:>5.1} % of the hemisphere        {values}");
-            }
-        }
-        Err(reason) => {
-            let _ = writeln!(t, "  scatter       not integrated: {reason}");
+}
+
+/// Integrated scatter: a row an incidence, and as many channels side by side as there is room for.
+fn scattered(t: &mut String, s: &Summary, list: &[Scatter]) {
+    fact(t, "scatter", "∫ f cosθo dωo over what was measured");
+    let names: Vec<&str> = s.channels.iter().map(|c| c.name.as_str()).collect();
+    let width = names.iter().map(|name| name.chars().count() + 1).fold(9, usize::max);
+    let lead = |theta: &str, covered: &str| format!("{theta:>COLUMN$}{covered:>9}");
+    let beside = ((COLUMNS - COLUMN - 9) / width).max(1);
+    for (k, group) in names.chunks(beside).enumerate() {
+        let heads: String = group.iter().map(|name| format!("{name:>width$}")).collect();
+        let _ = writeln!(t, "{}{heads}", lead("θi", "covered"));
+        for row in list {
+            let own = row.scatter.iter().skip(k * beside).take(group.len());
+            let values: String = own.map(|v| format!("{v:>width$.4}")).collect();
+            let (theta, covered) = (format!("{:.1}°", row.theta_i_deg), format!("{:.1} %", 100.0 * row.covered));
+            let _ = writeln!(t, "{}{values}", lead(&theta, &covered));
         }
     }
-    for note in &s.notes {
-        let _ = writeln!(t, "  note: {note}");
-    }
-    t
 }

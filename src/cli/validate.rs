@@ -11,6 +11,7 @@ use super::info::Reading;
 use super::output::{keeps_inputs, make_folder, write_json};
 use super::render::{PictureArgs, parse_exposure};
 use super::report;
+use super::text::indented;
 use super::ui::{self, Ui};
 use crate::brdf::Material;
 use crate::chain::{self, ChainError, Shown, Source, Stage};
@@ -94,11 +95,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         let options = RunOptions { measurement: Some(args.measurement.clone()), reading: args.reading.options() };
         report::of_folder(&args.out, &options)?;
     }
-    let head = format!("{name}, {} scene, {} samples a pixel\n", stage.spec.name, options.samples);
+    let head = format!("{name}, {} scene, {} samples a pixel", stage.spec.name, options.samples);
     for note in rows.iter().filter_map(|(_, c)| c.and_then(|c| c.note.as_ref())) {
         ui.warn(note);
     }
-    ui.result(&format!("{head}{}  written to {}\n", text(&rows), args.out.display()), &object);
+    let [head, end] = [head, format!("written to {}", args.out.display())].map(|line| indented(&line, 2));
+    ui.result(&format!("{head}\n{}  {end}\n", text(&rows)), &object);
     Ok(())
 }
 
@@ -169,6 +171,9 @@ fn numbers((k, ((file, fit), compared)): (usize, &Row<'_>)) -> Value {
     })
 }
 
+/// Columns of a fit's name in the table.
+const NAME: usize = 26;
+
 /// All fits as text.
 fn text(rows: &[Row<'_>]) -> String {
     let mut text = String::new();
@@ -176,7 +181,7 @@ fn text(rows: &[Row<'_>]) -> String {
         // Writing to a String can't fail.
         let _ = writeln!(
             text,
-            "  {:24} {:>9} {:>9} {:>6} {:>7} {:>6} {:>7}",
+            "  {:NAME$} {:>9} {:>9} {:>6} {:>7} {:>6} {:>7}",
             "", "rmse", "relMSE", "PSNR", "FLIP", "ΔE2000", "masked"
         );
     }
@@ -187,7 +192,7 @@ fn text(rows: &[Row<'_>]) -> String {
             continue;
         }
         let of_fit = fit.fit.as_ref().map_or(String::new(), |f| format!(", rmse {:.2e} over the readings", f.rmse));
-        let _ = writeln!(text, "  {label}: rendered alone{of_fit}");
+        let _ = writeln!(text, "  {}", indented(&format!("{label}: rendered alone{of_fit}"), 4));
     }
     text
 }
@@ -198,14 +203,13 @@ fn row(label: &str, c: &Comparison) -> String {
     let looks = |f: fn(&Appearance) -> String| c.appearance.as_ref().map_or("–".into(), f);
     let flip = looks(|a| format!("{:.4}", a.flip.mean));
     let delta_e = looks(|a| format!("{:.2}", a.delta_e_2000.mean));
-    format!(
-        "  {label:24} {:>9.2e} {:>9.2e} {psnr:>6} {flip:>7} {delta_e:>6} {:>7}\n    {}\n",
-        c.rmse,
-        c.rel_mse,
-        c.masked,
-        // On two lines, so that it fits a terminal.
-        sentence(c).replace("; ", ";\n    ")
-    )
+    // A longer name has a line of its own.
+    let is_long = label.chars().count() > NAME;
+    let (above, beside) = if is_long { (format!("  {}\n", indented(label, 4)), "") } else { (String::new(), label) };
+    let (rmse, rel_mse, masked) = (c.rmse, c.rel_mse, c.masked);
+    let said: String =
+        sentence(c).split_inclusive(';').map(|part| format!("    {}\n", indented(part.trim(), 4))).collect();
+    format!("{above}  {beside:NAME$} {rmse:>9.2e} {rel_mse:>9.2e} {psnr:>6} {flip:>7} {delta_e:>6} {masked:>7}\n{said}")
 }
 
 /// What stands above a fit's picture: its model, and its file where there are several.

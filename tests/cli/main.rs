@@ -25,6 +25,7 @@ mod report;
 mod scenes;
 mod shell;
 mod streams;
+mod terminal;
 mod threads;
 mod through;
 mod tradeoff;

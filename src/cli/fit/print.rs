@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::brdf::{FitRecord, Material, ModelChoice, PerChannel};
+use crate::cli::text::{COLUMNS, indented};
 use crate::fit::Loss;
 use crate::measurement::Dimension;
 
@@ -12,15 +13,16 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
     let default = FitRecord::default();
     let record = material.fit.as_ref().unwrap_or(&default);
     let unit = unit_of(record, material);
-    let _ = writeln!(
-        t,
-        "{name}: {}, {}, {} samples, rmse {}{unit}, {:.3} s",
-        material.model(),
-        record.status,
-        record.samples,
-        small(record.rmse, 3),
-        record.seconds
-    );
+    t.push_str(&head(
+        name,
+        [
+            material.model(),
+            record.status.clone(),
+            format!("{} samples", record.samples),
+            format!("rmse {}{unit}", small(record.rmse, 3)),
+            format!("{:.3} s", record.seconds),
+        ],
+    ));
     for (l, lobe) in material.lobes.iter().enumerate() {
         let name = material.lobe_name(l);
         let (errors, intervals) = (record.standard_error.get(l), record.interval_95.get(l));
@@ -56,6 +58,16 @@ pub(super) fn describe(name: &str, material: &Material) -> String {
     t
 }
 
+/// What is said of a name beside it, or below it where both are too long for a line.
+fn head<const N: usize>(name: &str, facts: [String; N]) -> String {
+    // A fact stays in one piece.
+    let bound = facts.map(|fact| fact.replace(' ', "\u{a0}")).join(", ");
+    let beside = format!("{name}: {bound}");
+    let fits = beside.chars().count() <= COLUMNS;
+    let text = if fits { beside } else { format!("{name}:\n  {}", indented(&bound, 2)) };
+    text.replace('\u{a0}', " ") + "\n"
+}
+
 /// Standard error and 95 % interval of a parameter.
 type Stated = (Option<f64>, Option<(f64, f64)>);
 
@@ -83,14 +95,18 @@ fn parameter(t: &mut String, record: &FitRecord, label: &str, value: f64, (error
         None if !open => format!("{} (at the end of its range)", plain(value)),
         _ => plus_minus(value, error),
     };
-    let _ = write!(t, "  {label:22} {shown}");
+    let mut line = format!("  {label:22} {shown}");
     if let Some((low, high)) = interval {
         let (below, above) = (value - low, high - value);
         let wide = error.is_some_and(|error| above + below > WIDE * error);
         if wide || below.max(above) > LOPSIDED * below.min(above) {
-            let _ = write!(t, "  (95 %: {} to {})", digits.show(low), digits.show(high));
+            let interval = format!("(95 %: {} to {})", digits.show(low), digits.show(high));
+            let fits = line.chars().count() + 2 + interval.chars().count() <= COLUMNS;
+            let gap = if fits { "  ".into() } else { format!("\n{:25}", "") };
+            line = line + &gap + &interval;
         }
     }
+    t.push_str(&line);
     t.push('\n');
 }
 
@@ -246,11 +262,8 @@ fn basis(choice: &ModelChoice, record: &FitRecord, unit: &str) -> Option<String>
     (!facts.is_empty()).then(|| format!("rmse and held out are {}{more}", facts.join(", ")))
 }
 
-/// Columns that prose is wrapped at.
-const COLUMNS: usize = 90;
-
 /// A paragraph indented by two, what follows its first line by four.
-fn hanging(text: &str) -> String {
+pub(super) fn hanging(text: &str) -> String {
     let mut lines = vec![String::from(" ")];
     for word in text.split(' ') {
         let last = lines.len() - 1;
@@ -334,6 +347,16 @@ mod tests {
     }
 
     #[test]
+    fn a_name_has_a_line_of_its_own_where_it_takes_one_and_facts_stay_whole() {
+        let facts = || ["lambert+phong", "converged", "rmse 1.2e-2 1/sr"].map(str::to_owned);
+        assert_eq!(head("p.csv", facts()), "p.csv: lambert+phong, converged, rmse 1.2e-2 1/sr\n");
+        let name = "a/long/way/to/the/second/lot/of/paint.csv";
+        assert_eq!(head(name, facts()), format!("{name}:\n  lambert+phong, converged, rmse 1.2e-2 1/sr\n"));
+        let long = head("p.csv", ["x".repeat(70), "rmse 1.2e-2 1/sr".into()]);
+        assert_eq!(long, format!("p.csv:\n  {},\n  rmse 1.2e-2 1/sr\n", "x".repeat(70)));
+    }
+
+    #[test]
     fn three_digits_whatever_the_size() {
         let shown = [0.0, 0.012_34, 1.0, 89.96, 12_345.6, 1e8, 2e-9].map(digits);
         assert_eq!(shown, ["0", "0.0123", "1.00", "90.0", "12346", "1.00e8", "2.00e-9"]);
@@ -349,7 +372,8 @@ mod tests {
         let text = shown("phong.exponent", 11.9955, Some(0.0033), (11.9921, 12.004));
         assert_eq!(text, "  phong.exponent         11.9955 ± 0.0033  (95 %: 11.9921 to 12.0040)\n");
         let text = shown("phong.exponent", 60.0, None, (60.0, 60.123_4));
-        assert!(text.ends_with("60.000000 (at the end of its range)  (95 %: 60.000 to 60.123)\n"), "{text}");
+        let below = format!("60.000000 (at the end of its range)\n{:25}(95 %: 60.000 to 60.123)\n", "");
+        assert!(text.ends_with(&below), "{text}");
         let text = shown("w", 1e-150, Some(2e-151), (0.0, 3e-150));
         assert!(text.ends_with("1.00e-150 ± 2.0e-151  (95 %: 0 to 3.00e-150)\n"), "{text}");
     }

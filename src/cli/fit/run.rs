@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::args::{Args, Wanted};
 use super::plan::targets;
-use super::print::describe;
+use super::print::{describe, hanging};
 use crate::cli::failure::Failure;
 use crate::cli::output::{check_folder, make_folder, write_text};
 use crate::cli::report;
@@ -121,7 +121,7 @@ fn one(
     }
     object["history"] = json!(history(&fitted));
     let said = describe(&file.display().to_string(), &fitted.material)
-        + &target.map_or(String::new(), |t| format!("  written to {}\n", t.display()));
+        + &target.map_or(String::new(), |t| hanging(&format!("written to {}", t.display())));
     Ok((said, object))
 }
 
