@@ -24,6 +24,8 @@ const STRUCTURE: &str = r#"(() => {
   }
   for (const e of all("img")) if (!e.alt || !e.alt.trim()) wrong.push("image-alt");
   for (const e of all("svg")) if (e.getAttribute("role") !== "img" || !name(e)) wrong.push(`svg-img-alt: ${e.outerHTML.slice(0, 80)}`);
+  for (const e of all("svg"))
+    if (e.querySelector("title")?.textContent !== e.getAttribute("aria-label")) wrong.push(`svg with two names: ${e.outerHTML.slice(0, 80)}`);
   for (const e of all("canvas")) if (e.getAttribute("role") !== "img" || !name(e)) wrong.push("canvas without a name");
   for (const e of all("input,button,a")) if (!name(e)) wrong.push(`label: ${e.outerHTML.slice(0, 80)}`);
   for (const e of all("fieldset")) if (!e.querySelector("legend")?.textContent.trim()) wrong.push("fieldset without a legend");

@@ -57,6 +57,7 @@ fn lobes_show_the_readings_and_fits_of_the_incidence_that_is_chosen() {
         let curves = &plotted["slices"][0]["curves"];
         click(&mut page, "incidence", &k.to_string());
         click(&mut page, "channel", &["r", "g", "b"].iter().position(|c| *c == channel).unwrap().to_string());
+        assert_told(&mut page, &format!("θi = {theta}°, channel {channel}"), curves);
         page.eval("document.querySelector('#lobe-frames').focus()");
         // The first key goes to the mirror direction or stays where it was; then to and fro.
         for key in ["ArrowRight", "ArrowRight", "ArrowLeft", "ArrowLeft"] {
@@ -68,6 +69,29 @@ fn lobes_show_the_readings_and_fits_of_the_incidence_that_is_chosen() {
                 let curve = curves.as_array().unwrap().iter().find(|c| c["name"] == name).expect(name);
                 close(found[i], value_at(curve, at), 1e-3, &format!("{name}, θi {theta}, {channel}: {said}"));
             }
+        }
+    }
+}
+
+/// Slice and polar chart tell those who can't see them what they show now: which each is, of what, and the peaks of its curves.
+fn assert_told(page: &mut Page, of: &str, curves: &Value) {
+    let told = page.eval(
+        "(() => {
+          const frame = [...document.querySelectorAll('#lobe-frames [data-channel]')].find((f) => !f.hidden);
+          const read = (svg) => [svg.getAttribute('aria-label'), ...['title', 'desc'].map((e) => svg.querySelector(e).textContent)];
+          return [...frame.querySelectorAll('svg')].map(read);
+        })()",
+    );
+    assert_eq!(told.as_array().unwrap().len(), 2, "{told}");
+    for (figure, kind) in told.as_array().unwrap().iter().zip(["BRDF over θo", "Polar chart"]) {
+        let name = format!("{kind}, {of}");
+        assert_eq!((&figure[0], &figure[1]), (&Value::from(&*name), &Value::from(&*name)));
+        for curve in curves.as_array().unwrap() {
+            let values = curve["value"].as_array().unwrap().iter().filter_map(Value::as_f64);
+            let largest = format!("{}: largest ", curve["name"].as_str().unwrap());
+            let said =
+                figure[2].as_str().unwrap().split(&largest).nth(1).unwrap_or_else(|| panic!("{largest}{figure}"));
+            close(numbers_in(said)[0], values.fold(0.0, f64::max), 1e-3, &format!("{name}: {said}"));
         }
     }
 }

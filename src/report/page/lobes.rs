@@ -9,7 +9,7 @@ use crate::measurement::Dimension;
 use crate::report::plot::{Scale, dot_class, line_class};
 use crate::report::run::Run;
 use crate::report::views::{
-    Curve, Shown, Slice, default_channel, incidences, polar_figure, scale_of, slice, slice_figure,
+    Curve, Shown, Slice, default_channel, described, incidences, polar_figure, scale_of, slice, slice_figure,
 };
 use crate::report::words::number;
 
@@ -90,6 +90,7 @@ pub(super) fn lobes(run: &Run) -> Option<Lobes> {
         chosen: k == first,
     };
     let choice = |(c, name): (usize, &&str)| Choice { index: c, label: (*name).into(), chosen: c == channel };
+    let said = |s: &Slice| (0..names.len()).map(|c| described(s, c, unit)).collect::<Vec<_>>();
     Some(Lobes {
         incidences: slices.iter().enumerate().map(incidence).collect(),
         channels: names.iter().enumerate().map(choice).collect(),
@@ -103,6 +104,7 @@ pub(super) fn lobes(run: &Run) -> Option<Lobes> {
         note: if thinned.contains(&true) { thinned_note() } else { String::new() },
         data: json!({
             "unit": unit, "channels": names, "incidences": slices.iter().map(|s| s.incidence_deg).collect::<Vec<_>>(),
+            "described": slices.iter().map(said).collect::<Vec<_>>(),
             "slices": slices.iter().map(|s| s.curves.iter().map(curve).collect::<Vec<_>>()).collect::<Vec<_>>(),
         }),
     })

@@ -39,6 +39,18 @@
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
     return parent.appendChild(element);
   }
+  // What a figure is called and what is read out of it, as it is drawn now.
+  function tell(svg, title, description) {
+    svg.setAttribute("aria-label", title);
+    const first = $("title", svg);
+    first.textContent = title;
+    let more = $("desc", svg);
+    if (!more) {
+      more = document.createElementNS(SVG, "desc");
+      first.after(more);
+    }
+    more.textContent = description;
+  }
   const numbers = (text) => text.split(" ").map((word) => (Number.isNaN(+word) ? word : +word));
   // From a value to its place on a scale, as the frame's attribute tells it.
   function placer(attribute) {
@@ -73,6 +85,7 @@
     const readout = $("#lobe-readout");
     const state = () => ({
       slice: lobes.slices[+chosen(form, "incidence")],
+      described: lobes.described[+chosen(form, "incidence")],
       incidence: lobes.incidences[+chosen(form, "incidence")],
       channel: +(chosen(form, "channel") ?? $("[data-channel]", frames).dataset.channel),
       log: chosen(form, "scale") === "log",
@@ -128,7 +141,8 @@
           const [cx, cy] = numbers(svg.dataset.polar);
           arrow.setAttribute("transform", `rotate(${-now.incidence} ${cx} ${cy})`);
         }
-        svg.setAttribute("aria-label", `θi = ${number(now.incidence)}°, channel ${lobes.channels[now.channel]}`);
+        const kind = svg.dataset.polar ? "Polar chart" : "BRDF over θo";
+        tell(svg, `${kind}, θi = ${number(now.incidence)}°, channel ${lobes.channels[now.channel]}`, now.described[now.channel]);
       }
       if (reading !== null) read(reading);
     }

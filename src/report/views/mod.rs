@@ -13,5 +13,7 @@ pub use energy::{AlbedoCurve, albedo_curves, energy_figure};
 pub use peak::{Peak, peak};
 pub use predict::Predicted;
 pub use residuals::{Binned, ResidualMaps, Statistic, residual_figure, residual_maps, residual_range};
-pub use slices::{Curve, Shown, Slice, default_channel, incidences, polar_figure, scale_of, slice, slice_figure};
+pub use slices::{
+    Curve, Shown, Slice, default_channel, described, incidences, polar_figure, scale_of, slice, slice_figure,
+};
 pub use sweep::{FrontSetting, Interval, Law, Sweep, SweepCurve, SweepPlot, SweepSlope};

@@ -177,7 +177,7 @@ pub fn scale_of(slices: &[Slice], channel: usize, log: bool) -> Scale {
 #[must_use]
 pub fn slice_figure(slice: &Slice, channel: usize, name: &str, y: Scale, unit: &str, titled: bool) -> Figure {
     let chart = Chart {
-        heading: heading(slice, (channel, name), unit, titled),
+        heading: heading("BRDF over θo", slice, (channel, name), unit, titled),
         x: Axis::new("θo [°], positive on the mirror side", Scale::degrees(-90.0, 90.0)),
         y: Axis::new(format!("BRDF [{unit}]"), y),
         series: series(slice, channel),
@@ -191,7 +191,7 @@ pub fn slice_figure(slice: &Slice, channel: usize, name: &str, y: Scale, unit: &
 #[must_use]
 pub fn polar_figure(slice: &Slice, channel: usize, name: &str, scale: Scale, unit: &str, titled: bool) -> Figure {
     let chart = PolarChart {
-        heading: heading(slice, (channel, name), unit, titled),
+        heading: heading("Polar chart", slice, (channel, name), unit, titled),
         label: format!("BRDF [{unit}]"),
         scale,
         series: series(slice, channel),
@@ -202,18 +202,23 @@ pub fn polar_figure(slice: &Slice, channel: usize, name: &str, scale: Scale, uni
     chart.figure()
 }
 
-/// Which slice it is, and, for those who can't see the figure, the peak of each curve.
-fn heading(slice: &Slice, (channel, name): (usize, &str), unit: &str, drawn: bool) -> Heading {
+/// Which slice it is, and, for those who can't see the figure, what kind of one and the peak of each curve.
+fn heading(kind: &str, slice: &Slice, (channel, name): (usize, &str), unit: &str, drawn: bool) -> Heading {
+    let of = format!("θi = {}°, channel {name}", number(slice.incidence_deg));
+    // Where it is drawn the kind is seen.
+    let title = if drawn { of } else { format!("{kind}, {of}") };
+    Heading { title, description: described(slice, channel, unit), drawn }
+}
+
+/// The peak of each curve of a channel, in words.
+#[must_use]
+pub fn described(slice: &Slice, channel: usize, unit: &str) -> String {
     let largest = |curve: &Curve| {
         let Peak { value, theta_o_deg, .. } = peak(curve, channel)?;
         let place = theta_o_deg.map_or_else(String::new, |theta| format!(" at {}°", number(theta)));
         Some(format!("{}: largest {} {unit}{place}", curve.name, number(value)))
     };
-    Heading {
-        title: format!("θi = {}°, channel {name}", number(slice.incidence_deg)),
-        description: slice.curves.iter().filter_map(largest).collect::<Vec<_>>().join("; "),
-        drawn,
-    }
+    slice.curves.iter().filter_map(largest).collect::<Vec<_>>().join("; ")
 }
 
 fn series(slice: &Slice, channel: usize) -> Vec<Series> {
