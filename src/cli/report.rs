@@ -17,9 +17,10 @@ const NAME: &str = "report.html";
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   goniofit report out/demo
+  goniofit report tradeoff/
   goniofit report gold/ --measurement gold.binary --out gold.html")]
 pub(super) struct Args {
-    /// The folder that demo, validate or fit --out-dir wrote to
+    /// The folder that demo, validate, fit --out-dir or tradeoff --out wrote to
     #[arg(value_name = "DIR")]
     folder: PathBuf,
     /// The measurement, where it is not where the folder's files say

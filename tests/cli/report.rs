@@ -1,5 +1,7 @@
 //! `report`, and `--report`: one page, whole, from whatever is there.
 
+use serde_json::json;
+
 use crate::bench::{Bench, csv, number};
 
 /// A page's visible data are where they belong: nothing from a file or name became markup.
@@ -197,7 +199,7 @@ fn what_is_no_run_is_refused_by_name() {
     b.write("broken/numbers.json", "{");
     for (folder, expected) in [
         ("none", "found no such folder"),
-        ("empty", "expected numbers.json of demo or validate, or fits"),
+        ("empty", "expected numbers.json of demo or validate, fits (.json) or a sweep"),
         ("odd", "neither `truth` nor `reference`"),
         ("broken", "numbers.json"),
     ] {
@@ -210,16 +212,8 @@ fn what_is_no_run_is_refused_by_name() {
     assert_eq!(ran.code, Some(2));
 }
 
-#[test]
-fn sweeps_and_effects_in_the_folder_join_the_page() {
-    let b = Bench::new();
-    b.ok(&["demo", "--size", "24", "--samples", "4", "--out", "d"]);
-    let effects = b.ok(&["effects", "--scene", "sphere-on-plane", "--size", "16", "--samples", "4", "--json"]);
-    b.write("d/effects.json", &effects.out);
-    std::fs::create_dir(b.path("d/sweep")).unwrap();
-    b.write(
-        "d/sweep/tradeoff.json",
-        r#"{"stage": "render", "subject": "cornell", "measures": [{"name": "relmse"}],
+/// What `tradeoff` writes of a curve of three settings.
+const SWEEP: &str = r#"{"stage": "render", "subject": "cornell", "measures": [{"name": "relmse"}],
             "commands": [["goniofit", "render", "--scene", "cornell", "--out", "my OUT.exr"]],
             "run": {"program": "goniofit 9.9", "command": ["goniofit", "tradeoff", "render", "--scene", "cornell", "--out", "my sweep"]},
             "curves": [{"name": "independent points", "main": "relmse",
@@ -230,8 +224,42 @@ fn sweeps_and_effects_in_the_folder_join_the_page() {
                        {"seconds": {"value": 0.5, "low": 0.49, "high": 0.51}, "errors": [{"value": 0.3, "low": 0.29, "high": 0.31}],
                         "setting": "--samples 17", "standing": "beaten"}],
             "slopes": [{"measure": "relmse", "slope": {"value": -0.51, "low": -0.55, "high": -0.47},
-                        "law": {"theory": {"kind": "exactly", "slope": -0.5}, "why": "independent samples"}}]}]}"#,
-    );
+                        "law": {"theory": {"kind": "exactly", "slope": -0.5}, "why": "independent samples"}}]}]}"#;
+
+#[test]
+fn a_folder_of_sweeps_alone_has_a_page_of_its_own() {
+    let b = Bench::new();
+    std::fs::create_dir_all(b.path("s/deeper")).unwrap();
+    b.write("s/tradeoff.json", SWEEP);
+    let said = b.json(&["report", "s"]);
+    assert_eq!((&said["missing"], &said["notes"], &said["warnings"]), (&json!([]), &json!([]), &json!(0)));
+    let page = b.text("s/report.html");
+    assert_whole(&page);
+    // The only one says how all of it was made.
+    let typed = "goniofit tradeoff render --scene cornell --out &#39;my sweep&#39;";
+    let run = format!("<p>The run:</p><pre tabindex=\"0\"><code>{typed}</code></pre>");
+    for part in ["<h1 id=\"title\">cornell: accuracy for time</h1>", "measured by tradeoff render", &run, "−0.510"] {
+        assert!(page.contains(part), "{part}");
+    }
+    for part in ["id=\"measured\"", "#measured", "id=\"pictures\"", "There is no fit"] {
+        assert!(!page.contains(part), "{part} has nothing to show");
+    }
+    // One that can't be read costs itself alone; where it is all that there is, it is the reason.
+    b.write("s/deeper/tradeoff.json", "{\"stage\": 1}");
+    let said = b.json(&["report", "s"]);
+    assert!(said["notes"][0].as_str().is_some_and(|note| note.contains("s/deeper/tradeoff.json")), "{said}");
+    let ran = b.run(&["report", "s/deeper"]);
+    assert!(ran.code == Some(2) && ran.err.contains("expected what goniofit wrote there"), "{}", ran.err);
+}
+
+#[test]
+fn sweeps_and_effects_in_the_folder_join_the_page() {
+    let b = Bench::new();
+    b.ok(&["demo", "--size", "24", "--samples", "4", "--out", "d"]);
+    let effects = b.ok(&["effects", "--scene", "sphere-on-plane", "--size", "16", "--samples", "4", "--json"]);
+    b.write("d/effects.json", &effects.out);
+    std::fs::create_dir(b.path("d/sweep")).unwrap();
+    b.write("d/sweep/tradeoff.json", SWEEP);
     b.ok(&["report", "d"]);
     let page = b.text("d/report.html");
     for part in ["off without it", "render: cornell", "−0.510", "−0.500", "independent samples"] {

@@ -114,6 +114,9 @@ fn seen(run: &Run) -> String {
 
 fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
     let mut missing = Missing::default();
+    if run.is_of_sweeps() {
+        return missing; // which have a part of their own alone
+    }
     if let Err(reason) = &run.table {
         let folder = run.folder.display().to_string();
         let command = typed(&["goniofit", "report", &folder, "--measurement", "FILE"]);

@@ -39,6 +39,10 @@ pub(super) fn summary(run: &Run) -> Summary {
 }
 
 fn subtitle(run: &Run) -> String {
+    if run.is_of_sweeps() {
+        let stages: Vec<&str> = run.sweeps.iter().map(|sweep| sweep.stage.as_str()).collect();
+        return format!("measured by tradeoff {}", stages.join(", "));
+    }
     let origin = match (&run.instrument, &run.table) {
         (Some(instrument), _) => format!("measured by simulation ({instrument})"),
         (None, Ok(table)) => table.summary.origin.clone(),
@@ -63,6 +67,11 @@ pub(super) fn best(run: &Run) -> Option<&RunFit> {
 }
 
 fn verdict(run: &Run) -> Vec<String> {
+    if run.is_of_sweeps() {
+        return vec![
+            "What each setting takes in time, and how far it is off, by trials with seeds of their own.".into(),
+        ];
+    }
     let mut said = Vec::new();
     let Some(fit) = best(run) else { return vec!["There is no fit to judge.".into()] };
     if let Some(residual) = fit.material().fit.as_ref().and_then(|r| r.residual.as_ref()) {

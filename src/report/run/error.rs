@@ -9,13 +9,13 @@ use crate::chain::ChainError;
 #[non_exhaustive]
 pub enum ReportError {
     /// No folder.
-    #[error("{path}: expected the folder that demo, validate or fit wrote to, found no such folder", path = path.display())]
+    #[error("{path}: expected the folder that demo, validate, fit or tradeoff wrote to, found no such folder", path = path.display())]
     NoFolder {
         /// What was named.
         path: PathBuf,
     },
     /// Nothing in it.
-    #[error("{path}: expected numbers.json of demo or validate, or fits (.json), found neither", path = path.display())]
+    #[error("{path}: expected numbers.json of demo or validate, fits (.json) or a sweep (tradeoff.json), found none of them", path = path.display())]
     Nothing {
         /// The folder.
         path: PathBuf,
@@ -25,6 +25,14 @@ pub enum ReportError {
     Numbers {
         /// The file.
         path: PathBuf,
+    },
+    /// A tradeoff.json of something else.
+    #[error("{path}: expected what goniofit wrote there, found {source}", path = path.display())]
+    Sweep {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: serde_json::Error,
     },
     /// A file's JSON is broken.
     #[error("{path}: {source}", path = path.display())]

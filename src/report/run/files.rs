@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::{Made, Picture, ReportError, SWEEP};
+use crate::report::views::Sweep;
 
 /// The JSON in a file.
 pub(super) fn json(path: &Path) -> Result<Value, ReportError> {
@@ -46,6 +47,14 @@ pub(super) fn sweeps(folder: &Path) -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = within.chain([folder.join(SWEEP)]).filter(|p| p.is_file()).collect();
     found.sort();
     found
+}
+
+/// A sweep as its file has it.
+pub(super) fn sweep(path: &Path) -> Result<Sweep, ReportError> {
+    let found = serde_json::from_value::<Sweep>(json(path)?);
+    let mut found = found.map_err(|source| ReportError::Sweep { path: path.into(), source })?;
+    found.file = path.into();
+    Ok(found)
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
-//! A folder with fits in it, as `fit --out-dir` leaves one.
+//! A folder with fits in it, as `fit --out-dir` leaves one; or with sweeps alone, as `tradeoff --out` does.
 
 use std::path::{Path, PathBuf};
 
-use super::{EFFECTS, Kind, Made, ReportError, Run, RunFit, RunOptions, SWEEP, Table, compared, json, left_out};
+use super::{
+    EFFECTS, Kind, Made, ReportError, Run, RunFit, RunOptions, SWEEP, Table, compared, json, left_out, sweep, sweeps,
+};
 use crate::brdf::Material;
 
 /// Names that a measurement beside its fits may have.
@@ -12,16 +14,14 @@ const OTHERS: [&str; 2] = [EFFECTS, SWEEP];
 
 pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportError> {
     let mut notes = Vec::new();
-    let (fits, mut refused) = fits(folder, &mut notes)?;
+    let (fits, refused) = fits(folder, &mut notes)?;
     if fits.is_empty() {
-        let nothing = ReportError::Nothing { path: folder.into() };
-        return Err(if refused.is_empty() { nothing } else { refused.swap_remove(0) });
+        return of_sweeps(folder, refused);
     }
     let path = options.measurement.clone().or_else(|| only_measurement(folder));
     let unknown = "which measurement the fits are of is not known: name it by --measurement FILE";
     let table = path.map_or_else(|| Err(unknown.into()), |path| Table::read(&path, &options.reading));
-    let name = folder.canonicalize().ok().and_then(|f| f.file_name().map(|n| n.to_string_lossy().into_owned()));
-    let title = table.as_ref().map(|t| t.measurement.name.clone()).ok().or(name);
+    let title = table.as_ref().map(|t| t.measurement.name.clone()).ok().or(name(folder));
     Ok(Run {
         kind: Kind::Fit,
         folder: folder.into(),
@@ -31,6 +31,40 @@ pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportErr
         notes: refused.iter().map(|error| left_out(&error.to_string())).chain(notes).collect(),
         ..Run::empty()
     })
+}
+
+/// A folder without fits: its sweeps, if any can be read.
+fn of_sweeps(folder: &Path, mut refused: Vec<ReportError>) -> Result<Run, ReportError> {
+    let mut found = Vec::new();
+    for path in sweeps(folder) {
+        match sweep(&path) {
+            Ok(sweep) => found.push(sweep),
+            Err(error) => refused.push(error),
+        }
+    }
+    if found.is_empty() {
+        let nothing = ReportError::Nothing { path: folder.into() };
+        return Err(if refused.is_empty() { nothing } else { refused.swap_remove(0) });
+    }
+    // One alone says how all of it was made.
+    let only = if let [only] = &found[..] { Some(only) } else { None };
+    let of = only.map(|sweep| sweep.subject.clone()).or_else(|| name(folder));
+    Ok(Run {
+        kind: Kind::Sweeps,
+        folder: folder.into(),
+        title: of.map_or_else(|| "accuracy for time".into(), |of| format!("{of}: accuracy for time")),
+        seed: only.map(|sweep| sweep.seed),
+        made: only.map_or_else(Made::default, |sweep| Made::of(&sweep.run)),
+        notes: refused.iter().map(|error| left_out(&error.to_string())).collect(),
+        sweeps: found,
+        ..Run::empty()
+    })
+}
+
+/// The folder's own name.
+fn name(folder: &Path) -> Option<String> {
+    let folder = folder.canonicalize().ok()?;
+    folder.file_name().map(|name| name.to_string_lossy().into_owned())
 }
 
 /// Every material in the folder, by name, and what can't be read.

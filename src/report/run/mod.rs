@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 pub use error::ReportError;
-use files::{found, json, picture, sweeps};
+use files::{found, json, picture, sweep, sweeps};
 pub use sight::fitted_through;
 pub(in crate::report) use sight::known_instrument;
 pub use table::Table;
@@ -32,6 +32,8 @@ pub enum Kind {
     Validate,
     /// `fit`, or a folder with fits in it.
     Fit,
+    /// `tradeoff` alone.
+    Sweeps,
 }
 
 /// A fit of a run.
@@ -160,13 +162,19 @@ impl Run {
             let known = |value: Value| if value["effects"].is_array() { Ok(value) } else { Err("no list `effects`") };
             self.effects = self.extra(&effects, known);
         }
-        for path in sweeps(&self.folder) {
-            let sweep = self.extra(&path, serde_json::from_value::<Sweep>);
-            self.sweeps.extend(sweep.map(|mut sweep| {
-                sweep.file = path;
-                sweep
-            }));
+        // A folder of sweeps alone has them already.
+        let more = if self.is_of_sweeps() { Vec::new() } else { sweeps(&self.folder) };
+        for path in more {
+            match sweep(&path) {
+                Ok(sweep) => self.sweeps.push(sweep),
+                Err(error) => self.notes.push(left_out(&error.to_string())),
+            }
         }
+    }
+
+    /// Whether nothing else is there to be shown.
+    pub(in crate::report) fn is_of_sweeps(&self) -> bool {
+        self.kind == Kind::Sweeps
     }
 
     /// What `understood` makes of a file's JSON.
