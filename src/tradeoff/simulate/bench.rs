@@ -58,10 +58,10 @@ pub(super) struct Bench<'a> {
     what: &'a SimulateSweep<'a>,
     seed: u64,
     control: Control<'a>,
-    /// Readings without noise to the finest accuracy, by round.
-    finest: HashMap<u32, Raw>,
-    /// Readings with all effects but noise, by round.
-    whole: HashMap<(u32, Option<&'static str>), Judged>,
+    /// Readings without noise to the finest accuracy, and the round that they are of: no other reads them.
+    finest: Option<(u32, Raw)>,
+    /// Readings of a round with all effects but noise, or with the one kind of noise that is looked at.
+    whole: HashMap<Option<&'static str>, (u32, Judged)>,
     /// True values, by scan.
     truths: HashMap<String, Vec<f64>>,
     quadrature_error: f64,
@@ -76,14 +76,14 @@ struct Judged {
 
 impl<'a> Bench<'a> {
     pub fn new(what: &'a SimulateSweep<'a>, seed: u64, control: Control<'a>) -> Self {
-        let (finest, whole, truths) = (HashMap::new(), HashMap::new(), HashMap::new());
-        Self { what, seed, control, finest, whole, truths, quadrature_error: 0.0 }
+        let (whole, truths) = (HashMap::new(), HashMap::new());
+        Self { what, seed, control, finest: None, whole, truths, quadrature_error: 0.0 }
     }
 
     /// What the references are.
     pub fn said(&self) -> Vec<String> {
         let mut said = Vec::new();
-        if !self.finest.is_empty() {
+        if self.finest.is_some() {
             said.push(format!(
                 "quadratures: the same readings with means over cones to {FINEST:.0e}; their last doubling moved them by {:.1e} at most",
                 self.quadrature_error
@@ -138,13 +138,14 @@ impl<'a> Bench<'a> {
 
     fn quadrature(&mut self, rules: Rules, round: u32) -> Result<Trial, ChainError> {
         let seed = self.instrument_of(round);
-        if !self.finest.contains_key(&round) {
+        self.finest.take_if(|(of, _)| *of != round);
+        if self.finest.is_none() {
             let (raw, _) = self.read((FINEST, None), &NOISE, seed)?;
             self.quadrature_error = self.quadrature_error.max(raw.quadrature_error);
-            self.finest.insert(round, raw);
+            self.finest = Some((round, raw));
         }
         let (raw, seconds) = self.read(rules, &NOISE, seed)?;
-        let error = self.finest.get(&round).map_or(f64::NAN, |finest| of_samples(&raw, finest));
+        let error = self.finest.as_ref().map_or(f64::NAN, |(_, finest)| of_samples(&raw, finest));
         Ok(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN] })
     }
 
@@ -153,15 +154,16 @@ impl<'a> Bench<'a> {
         // Of noise only the one that is looked at.
         let own = name.filter(|name| NOISE.contains(name));
         let quiet: Vec<&str> = NOISE.into_iter().filter(|noise| Some(*noise) != own).collect();
-        if !self.whole.contains_key(&(round, own)) {
+        self.whole.retain(|_, (of, _)| *of == round);
+        if !self.whole.contains_key(&own) {
             let (raw, _) = self.read((ACCURACY, None), &quiet, seed)?;
             let judged = self.judge(raw)?;
-            self.whole.insert((round, own), judged);
+            self.whole.insert(own, (round, judged));
         }
         let left_out: Vec<&str> = quiet.iter().copied().chain(name).collect();
         let (raw, seconds) = self.read((ACCURACY, None), &left_out, seed)?;
         let less = self.judge(raw)?;
-        let Some(all) = self.whole.get(&(round, own)) else { return Ok(Trial { seconds, errors: vec![f64::NAN; 3] }) };
+        let Some((_, all)) = self.whole.get(&own) else { return Ok(Trial { seconds, errors: vec![f64::NAN; 3] }) };
         let parameters =
             less.fitted.as_ref().zip(all.fitted.as_ref()).map_or(f64::NAN, |(less, all)| parameter_error(less, all));
         let errors = vec![of_samples(&less.raw, &all.raw), relative_change(&less.values, &all.values), parameters];
@@ -251,11 +253,43 @@ fn of_samples(raw: &Raw, reference: &Raw) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::BuiltInMaterial;
 
     #[test]
     fn changes_are_relative_to_the_larger_and_leave_out_what_is_not_known() {
         let found = relative_change(&[1.0, 0.0, f64::NAN, 0.0, -1.0], &[2.0, 3.0, 1.0, 0.0, 1.0]);
         // ½, 1, –, 0, 2: a change of sign is the only one above 1.
         assert!((found - ((0.25 + 1.0 + 4.0) / 4.0f64).sqrt()).abs() < 1e-15, "{found}");
+    }
+
+    /// Raw readings are large, and rounds may be many.
+    #[test]
+    fn what_a_round_is_measured_against_goes_with_it() {
+        let source = Source::Fitted(Box::new(BuiltInMaterial::find("satin").expect("built in").material()));
+        let (instrument, scan) = (Instrument::default(), Scan::InPlane { step_deg: 30.0 });
+        let what = SimulateSweep {
+            source: &source,
+            name: "satin",
+            instrument: &instrument,
+            scan: &scan,
+            quadrature: vec![],
+            orders: vec![],
+            effects: true,
+            readings: vec![],
+            dwell: vec![],
+            steps: vec![],
+        };
+        let mut bench = Bench::new(&what, 3, Control::silent());
+        let mut tried = |round: u32| {
+            let turn = Turn { round, seed: 0, again: false };
+            let reads = [Read::Quadrature(1e-3), Read::Without(None), Read::Without(Some("shot noise"))];
+            let errors = reads.map(|read| bench.trial(&read, turn).expect("reads").errors[0]);
+            let rounds: Vec<u32> = bench.whole.values().map(|(of, _)| *of).collect();
+            let kept = (bench.finest.as_ref().map(|(of, _)| *of), rounds);
+            assert_eq!(kept, (Some(round), vec![round; 2]), "one of all effects, one with the noise that is looked at");
+            errors.map(f64::to_bits)
+        };
+        let all: Vec<[u64; 3]> = [0, 1, 2, 0].into_iter().map(&mut tried).collect();
+        assert!(all[0] == all[3] && all[0][2] != all[1][2], "a round comes out as it did, and unlike others: {all:?}");
     }
 }
