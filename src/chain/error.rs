@@ -95,6 +95,23 @@ pub enum ChainError {
     /// A simulation with too many raw readings.
     #[error("{0}")]
     TooManyReadings(String),
+    /// A sweep of more or larger pictures than there is room for.
+    #[error(
+        "{settings} settings of {width}×{height} pixels: expected at most {most_gib:.1} GiB of sums of pictures, found {found_gib:.1}; \
+         sweep fewer settings, or smaller pictures"
+    )]
+    TooManyPictures {
+        /// Settings, each with a sum of its own.
+        settings: usize,
+        /// Width of a picture, pixels.
+        width: u32,
+        /// Its height.
+        height: u32,
+        /// What the sums would take, GiB.
+        found_gib: f64,
+        /// What they may take.
+        most_gib: f64,
+    },
     /// Two inputs that don't go together.
     #[error("{0}")]
     Mismatch(String),

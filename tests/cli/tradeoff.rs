@@ -260,6 +260,9 @@ fn what_can_t_be_had_is_said() {
     assert_eq!(ran.code, Some(2));
     let ran = b.run(&[&fit[..], &["--time-budget", "1us"]].concat());
     assert!(ran.code == Some(1) && ran.err.contains("more time"), "{}", ran.err);
+    // Before any picture is taken.
+    let ran = b.run(&typed("tradeoff render --size 16384 --samples 4,8"));
+    assert!(ran.code == Some(2) && ran.err.contains("at most 4.0 GiB") && ran.err.contains("36.0"), "{}", ran.err);
     let ran = b.run(&["tradeoff", "chain", "--material", "paint.csv"]);
     assert!(ran.code == Some(2) && ran.err.contains("measurement"), "{}", ran.err);
     let ran = b.run(&["tradeoff", "simulate", "--material", "satin", "--scan", "adaptive"]);

@@ -83,6 +83,9 @@ pub(in crate::tradeoff) struct Gathered {
 }
 
 impl Gathered {
+    /// Bytes that it takes of each pixel.
+    pub const PIXEL: usize = size_of::<DVec3>();
+
     /// Adds a picture.
     pub fn add(&mut self, truth: &Truth, image: &Image) {
         let off = truth.off(image);

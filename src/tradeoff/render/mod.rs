@@ -49,6 +49,9 @@ pub enum Way {
 const FEW: u32 = 8;
 /// Times the most samples that half of the reference has.
 const BETTER: u32 = 4;
+/// Bytes of a GiB, and those that all sums of pictures may take.
+const GIB: f64 = (1u64 << 30) as f64;
+const ROOM: f64 = 4.0 * GIB;
 
 const MEASURES: [Measure; 4] = [
     Measure { name: "error", what: "root of the mean of (x − truth)²/(truth² + (L̄/10)²)" },
@@ -114,6 +117,8 @@ pub fn sweep(
     control: Control<'_>,
 ) -> Result<Sweep, ChainError> {
     let began = Instant::now();
+    let (series, settings) = design(what);
+    within_memory(settings.len(), what.size)?;
     let scenes: Vec<Scene> = what.ways.iter().map(|way| scene(stage, subject, *way)).collect::<Result<_, _>>()?;
     let own = chain::scene(stage, subject.cloned())?;
     let (width, height) = what.size;
@@ -126,7 +131,6 @@ pub fn sweep(
     };
     // Seeds that no trial has: those are mixed.
     let truth = Truth::of(&shot(u64::MAX / 2)?, &shot(u64::MAX / 2 + 1)?);
-    let (series, settings) = design(what);
     let mut gathered: Vec<Gathered> = settings.iter().map(|_| Gathered::default()).collect();
     let runs = run(&settings, effort, control, |index, turn| {
         let shot = settings[index].what;
@@ -165,6 +169,16 @@ pub fn sweep(
         notes: notes(&runs.trials, truth.untold()),
     };
     Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
+}
+
+/// Refuses sums of pictures, one a setting, that take more than [`ROOM`].
+fn within_memory(settings: usize, (width, height): (u32, u32)) -> Result<(), ChainError> {
+    let found = settings as f64 * f64::from(width) * f64::from(height) * Gathered::PIXEL as f64;
+    if found <= ROOM {
+        return Ok(());
+    }
+    let [found_gib, most_gib] = [found, ROOM].map(|bytes| bytes / GIB);
+    Err(ChainError::TooManyPictures { settings, width, height, found_gib, most_gib })
 }
 
 fn notes(trials: &[Vec<Trial>], untold: f64) -> Vec<String> {
@@ -245,4 +259,26 @@ fn picture(scene: &Scene, way: Way, options: &Options, control: Control<'_>) -> 
     image.radiance.iter_mut().for_each(|p| *p = p.map(|x| x / f64::from(parts)));
     image.standard_error = None;
     Ok((image, seconds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_pictures_than_there_is_room_for_are_refused_with_both_numbers() {
+        // 4 GiB are 178.96 million pixels of 24 bytes.
+        assert!(within_memory(178, (1000, 1000)).is_ok());
+        for (settings, size, found) in [(179, (1000, 1000), "4.0"), (6, (16384, 16384), "36.0")] {
+            let said = within_memory(settings, size).expect_err("too many").to_string();
+            let (width, height) = size;
+            for part in [
+                format!("{settings} settings of {width}×{height}"),
+                "at most 4.0 GiB".into(),
+                format!("found {found};"),
+            ] {
+                assert!(said.contains(&part), "{part}: {said}");
+            }
+        }
+    }
 }
