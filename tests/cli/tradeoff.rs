@@ -87,12 +87,16 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
 fn independent_samples_have_their_slope_and_a_cut_path_its_bias_whatever_the_threads() {
     let b = Bench::new();
     let args = typed(
-        "tradeoff render --scene sphere-on-plane --size 24 --samples 8,32,128 --trials 6 --ways scene,independent --depths 1 --seed 5",
+        "tradeoff render --scene sphere-on-plane --size 24 --samples 8,16,64,256 --trials 6 --ways scene,independent --depths 1 --seed 5",
     );
     let found = b.json(&args);
     let independent = slope(&found, "independent samples", "error");
     assert!((independent + 0.5).abs() < 0.05, "{independent}");
     assert!(slope(&found, "plan of the scene", "error") < independent, "Sobol' points are more even");
+    // A mean of one picture of 8 samples has no other that it is independent of.
+    let points = |name: &str| curve(&found, name)["slopes"][0]["points"].clone();
+    assert_eq!((points("independent samples"), points("plan of the scene")), (3.into(), 4.into()));
+    assert!(found["notes"].to_string().contains("8 Sobol' points"), "{}", found["notes"]);
     let m = measure(&found, "bias");
     let bias = |name: &str| curve(&found, name)["points"][2]["errors"][m].clone();
     assert_eq!(number(&bias("plan of the scene")["low"]), 0.0, "{}", bias("plan of the scene"));

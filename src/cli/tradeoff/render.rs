@@ -43,8 +43,8 @@ pub(super) struct Args {
     /// Relative errors to ask for, as by `render --target-error` (10%,2%)
     #[arg(long, value_delimiter = ',', value_name = "E,E,…", value_parser = parse_tolerance)]
     targets: Vec<f64>,
-    /// Ways to render: scene (its own plan), full (everything on, one path at a time), independent (points that know nothing of each other), chance and
-    /// aimed (lights found by one way alone)
+    /// Ways to render: scene (its own plan), full (everything on, one path at a time), independent (means of pictures of 8
+    /// samples that know nothing of each other), chance and aimed (lights found by one way alone)
     #[arg(long, value_delimiter = ',', value_name = "WAY,…", default_value = "scene,full,independent", value_parser = parse_way)]
     ways: Vec<Way>,
     /// Scattering events of a path at most, to try beside the scene's

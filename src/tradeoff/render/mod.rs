@@ -41,7 +41,8 @@ pub enum Way {
     Depth(u32),
     /// Lights found by one of the two ways alone, instead of both.
     Lights(Strategy),
-    /// Points that know nothing of each other, as far as the film can: the mean of pictures of few samples, each with a seed of its own.
+    /// Blocks of points that know nothing of each other, as far as the film can: the mean of pictures of few samples, each
+    /// with a seed of its own.
     Independent,
 }
 
@@ -64,7 +65,7 @@ const SOBOL: Law = Law {
     theory: Theory::AtMost(-0.5),
     why: "scrambled Sobol' points are at least as good as independent ones, better the smoother the light",
 };
-const INDEPENDENT: Law = Law { theory: Theory::Exactly(-0.5), why: "independent samples" };
+const INDEPENDENT: Law = Law { theory: Theory::Exactly(-0.5), why: "independent blocks of 8 samples" };
 
 impl Way {
     fn name(self) -> String {
@@ -81,6 +82,13 @@ impl Way {
 
     fn law(self) -> Law {
         if self == Self::Independent { INDEPENDENT } else { SOBOL }
+    }
+
+    /// What of the samples theory speaks of, where that is not all of them: whole blocks that are independent, more than one.
+    fn effective(self, samples: u32) -> Option<f64> {
+        let blocks = f64::from(samples.div_ceil(FEW));
+        let counted = if blocks > 1.0 { blocks * f64::from(FEW) } else { f64::INFINITY };
+        (self == Self::Independent).then_some(counted)
     }
 
     /// Whether the picture's expected value is the reference's.
@@ -166,7 +174,7 @@ pub fn sweep(
             &format!("{width}x{height}"),
         ])],
         reference: vec![truth.said(half, smallest)],
-        notes: notes(&runs.trials, truth.untold()),
+        notes: notes(what, &runs.trials, truth.untold()),
     };
     Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
 }
@@ -181,13 +189,19 @@ fn within_memory(settings: usize, (width, height): (u32, u32)) -> Result<(), Cha
     Err(ChainError::TooManyPictures { settings, width, height, found_gib, most_gib })
 }
 
-fn notes(trials: &[Vec<Trial>], untold: f64) -> Vec<String> {
+fn notes(what: &RenderSweep, trials: &[Vec<Trial>], untold: f64) -> Vec<String> {
     let close = trials.iter().flatten().filter(|t| t.errors[0].is_nan()).count();
     let all: usize = trials.iter().map(Vec::len).sum();
-    (close > 0)
-        .then(|| format!("{close} of {all} trials come too near to the reference to be judged, and their settings have no error: ask for a better one (--reference). Such a trial is off by less than {untold:.1e}, and keeps a promise of more"))
-        .into_iter()
-        .collect()
+    let unjudged = format!(
+        "{close} of {all} trials come too near to the reference to be judged, and their settings have no error: ask for a \
+         better one (--reference). Such a trial is off by less than {untold:.1e}, and keeps a promise of more"
+    );
+    let blocks = format!(
+        "independent samples are means of pictures of {FEW} Sobol' points a pixel, each with a seed of its own: of more \
+         samples as many whole pictures as hold them, and {FEW} or less take no part in slopes"
+    );
+    let said = [(close > 0, unjudged), (what.ways.contains(&Way::Independent), blocks)];
+    said.into_iter().filter_map(|(is_so, note)| is_so.then_some(note)).collect()
 }
 
 fn scene(stage: &Stage, subject: Option<&Material>, way: Way) -> Result<Scene, ChainError> {
@@ -217,7 +231,8 @@ fn design(what: &RenderSweep) -> (Vec<Series>, Vec<Setting<Shot>>) {
         for &samples in &what.samples {
             let size = f64::from(samples);
             let text = Knob::Samples.typed(size, 0.0);
-            settings.push(Setting::sized(series.len() - 1, size, text, Shot { way, samples, target: None }));
+            let setting = Setting::sized(series.len() - 1, size, text, Shot { way, samples, target: None });
+            settings.push(Setting { effective: kind.effective(samples), ..setting });
         }
     }
     // As `render` does it, by the scene's plan, where that is among the ways.
@@ -264,6 +279,19 @@ fn picture(scene: &Scene, way: Way, options: &Options, control: Control<'_>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn independent_samples_are_counted_in_blocks() {
+        let ways = vec![Way::Scene, Way::Independent];
+        let what = RenderSweep { size: (8, 8), samples: vec![4, 8, 12, 16], targets: vec![], ways, reference: None };
+        let (_, settings) = design(&what);
+        let found: Vec<Option<f64>> = settings.iter().map(|s| s.effective).collect();
+        let none = f64::INFINITY;
+        assert_eq!(found[..4], [None; 4], "Sobol' points count each");
+        assert_eq!(found[4..], [none, none, 16.0, 16.0].map(Some));
+        assert!(notes(&what, &[], 0.0).concat().contains("pictures of 8 Sobol' points"));
+        assert!(notes(&RenderSweep { ways: vec![Way::Scene], ..what }, &[], 0.0).is_empty());
+    }
 
     #[test]
     fn more_pictures_than_there_is_room_for_are_refused_with_both_numbers() {
