@@ -162,13 +162,13 @@ fn scattered(t: &mut String, s: &Summary, list: &[Scatter]) {
     let lead = |theta: &str, covered: &str| format!("{theta:>COLUMN$}{covered:>9}");
     let beside = ((COLUMNS - COLUMN - 9) / width).max(1);
     for (k, group) in names.chunks(beside).enumerate() {
-        let heads: String = group.iter().map(|name| format!("{name:>width$}")).collect();
-        let _ = writeln!(t, "{}{heads}", lead("θi", "covered"));
+        let heads: Vec<String> = group.iter().map(|name| format!("{name:>width$}")).collect();
+        let _ = writeln!(t, "{}{}", lead("θi", "covered"), heads.concat());
         for row in list {
             let own = row.scatter.iter().skip(k * beside).take(group.len());
-            let values: String = own.map(|v| format!("{v:>width$.4}")).collect();
+            let values: Vec<String> = own.map(|v| format!("{v:>width$.4}")).collect();
             let (theta, covered) = (format!("{:.1}°", row.theta_i_deg), format!("{:.1} %", 100.0 * row.covered));
-            let _ = writeln!(t, "{}{values}", lead(&theta, &covered));
+            let _ = writeln!(t, "{}{}", lead(&theta, &covered), values.concat());
         }
     }
 }

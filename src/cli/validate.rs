@@ -207,9 +207,11 @@ fn row(label: &str, c: &Comparison) -> String {
     let is_long = label.chars().count() > NAME;
     let (above, beside) = if is_long { (format!("  {}\n", indented(label, 4)), "") } else { (String::new(), label) };
     let (rmse, rel_mse, masked) = (c.rmse, c.rel_mse, c.masked);
-    let said: String =
-        sentence(c).split_inclusive(';').map(|part| format!("    {}\n", indented(part.trim(), 4))).collect();
-    format!("{above}  {beside:NAME$} {rmse:>9.2e} {rel_mse:>9.2e} {psnr:>6} {flip:>7} {delta_e:>6} {masked:>7}\n{said}")
+    let said: Vec<String> = sentence(c).split_inclusive(';').map(|part| indented(part.trim(), 4)).collect();
+    let said = said.join("\n    ");
+    format!(
+        "{above}  {beside:NAME$} {rmse:>9.2e} {rel_mse:>9.2e} {psnr:>6} {flip:>7} {delta_e:>6} {masked:>7}\n    {said}\n"
+    )
 }
 
 /// What stands above a fit's picture: its model, and its file where there are several.

@@ -102,8 +102,9 @@ fn parameter(t: &mut String, record: &FitRecord, label: &str, value: f64, (error
         if wide || below.max(above) > LOPSIDED * below.min(above) {
             let interval = format!("(95 %: {} to {})", digits.show(low), digits.show(high));
             let fits = line.chars().count() + 2 + interval.chars().count() <= COLUMNS;
-            let gap = if fits { "  ".into() } else { format!("\n{:25}", "") };
-            line = line + &gap + &interval;
+            let gap = if fits { "  ".to_owned() } else { format!("\n{:25}", "") };
+            line.push_str(&gap);
+            line.push_str(&interval);
         }
     }
     t.push_str(&line);

@@ -77,7 +77,8 @@ fn typed(advice: &Advice, sweep: &Sweep) -> String {
     let words: Vec<&str> = advice.setting.split(' ').collect();
     let each = if sweep.commands.len() > 1 { 2 } else { words.len() };
     let lines = sweep.commands.iter().zip(words.chunks(each));
-    lines.map(|(command, options)| format!("  {}\n", report::typed(&with(command, options)))).collect()
+    let typed = |(command, options): (&Vec<String>, &[&str])| report::typed(&with(command, options));
+    lines.map(|line| format!("  {}\n", typed(line))).collect::<Vec<_>>().concat()
 }
 
 /// The command with options, the first of which takes the place of what was typed of it: a scan of its own, say.

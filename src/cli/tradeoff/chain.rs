@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 /// The commands that a setting's options go with, one each: what is swept is measured, fitted and rendered.
 fn base(args: &Args, plan: &Plan, what: &ChainSweep<'_>) -> Vec<Vec<String>> {
     let spec = || args.what.spec.as_ref().map(|spec| spec.display().to_string());
-    // A fit is made through what is no point.
+    // Through an instrument of points a fit is the plain one.
     let is_seen = plan.scan.dimension() == Dimension::Space && Cones::of(&plan.instrument).is_some();
     let through = args.what.instrument.clone().or_else(spec).filter(|_| is_seen);
     let model = option("model", Some(&what.model));

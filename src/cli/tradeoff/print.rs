@@ -118,6 +118,7 @@ fn reach(e: Estimate) -> String {
         return String::new();
     }
     match (e.high / e.low).sqrt() {
+        f if f < 1.0005 => String::new(), // of a fit's second beside the instrument's hours
         f if f < 1.095 => format!("±{:.1}%", 100.0 * (f - 1.0)),
         f if f < 2.0 => format!("±{:.0}%", 100.0 * (f - 1.0)),
         f if f < 10.0 => format!("×{f:.1}"),
@@ -180,7 +181,7 @@ mod tests {
         assert_eq!(reach(estimate(3.0, 1.031)), "±3.1%");
         assert_eq!(reach(estimate(3.0, 1.5)), "±50%");
         assert_eq!(reach(estimate(3.0, 4.0)), "×4.0");
-        assert_eq!(reach(Estimate::alone(3.0)), "");
+        assert_eq!([reach(Estimate::alone(3.0)), reach(estimate(3.0, 1.0001))], ["", ""]);
         assert_eq!(value(Estimate { value: 0.001, low: 0.0, high: 0.002 }), "<2.00e-3");
         assert_eq!(
             [time(2e-6), time(0.0123), time(2.0), time(100.0), time(7200.0)],
