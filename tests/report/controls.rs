@@ -57,7 +57,7 @@ fn lobes_show_the_readings_and_fits_of_the_incidence_that_is_chosen() {
         let curves = &plotted["slices"][0]["curves"];
         click(&mut page, "incidence", &k.to_string());
         click(&mut page, "channel", &["r", "g", "b"].iter().position(|c| *c == channel).unwrap().to_string());
-        assert_told(&mut page, &format!("θi = {theta}°, channel {channel}"), curves);
+        assert_told(&mut page, &format!("θi = {}°, channel {channel}", theta.round()), curves);
         page.eval("document.querySelector('#lobe-frames').focus()");
         // The first key goes to the mirror direction or stays where it was; then to and fro.
         for key in ["ArrowRight", "ArrowRight", "ArrowLeft", "ArrowLeft"] {

@@ -116,7 +116,7 @@ struct Shot {
 /// Sweeps the knobs of a scene's rendering.
 ///
 /// # Errors
-/// [`ChainError`] where the scene can't be built or rendered.
+/// [`ChainError`] where the scene can't be built or rendered, or there is no room for so many pictures of this size.
 pub fn sweep(
     stage: &Stage,
     subject: Option<&Material>,
