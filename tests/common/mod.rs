@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use goniofit::control::Control;
-use goniofit::render::{Film, Materials, Options, Scene, SceneSpec, render};
+use goniofit::render::{Film, Materials, Options, Plan, Scene, SceneSpec, render};
 
 /// A scene from the text of a scene file.
 pub fn scene(toml: &str) -> Scene {
@@ -21,13 +21,30 @@ pub fn scene_with(toml: &str, materials: &Materials) -> Scene {
 
 /// A square picture.
 pub fn picture(scene: &Scene, size: u32, samples: u32, seed: u64) -> Film {
-    let options = Options { width: size, height: size, samples, seed, ..Options::default() };
+    picture_by(Plan::of(scene), scene, size, samples, seed)
+}
+
+/// A square picture by a plan.
+pub fn picture_by(plan: Plan, scene: &Scene, size: u32, samples: u32, seed: u64) -> Film {
+    let options = Options { width: size, height: size, samples, seed, plan: Some(plan), ..Options::default() };
     render(scene, &options, Control::silent()).expect("options are in range")
+}
+
+/// What a scene that packets can walk through calls for, and everything one path at a time.
+pub fn both_ways(scene: &Scene) -> [Plan; 2] {
+    let derived = Plan::of(scene);
+    assert!(derived.packets, "{derived:?}");
+    [derived, Plan::FULL]
 }
 
 /// Radiance and standard error of a picture of one pixel.
 pub fn one_pixel(scene: &Scene, samples: u32) -> (DVec3, DVec3) {
-    let film = picture(scene, 1, samples, 3);
+    one_pixel_by(Plan::of(scene), scene, samples)
+}
+
+/// The same by a plan.
+pub fn one_pixel_by(plan: Plan, scene: &Scene, samples: u32) -> (DVec3, DVec3) {
+    let film = picture_by(plan, scene, 1, samples, 3);
     (film.radiance(0, 0).expect("pixel"), film.standard_error(0, 0).expect("pixel"))
 }
 
