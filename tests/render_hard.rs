@@ -11,13 +11,13 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::path::Path;
 
-use common::{excess, mean, one_pixel, picture, scene, spot_camera, toml, transformed};
+use common::{both_ways, excess, mean, one_pixel_by, picture, picture_by, scene, spot_camera, toml, transformed};
 use glam::DVec3;
 use goniofit::control::Control;
 use goniofit::geometry::{Frame, direction};
 use goniofit::image::compare;
 use goniofit::render::scene::builtin;
-use goniofit::render::{Film, Materials, Options, Scene, SceneSpec, Strategy, render};
+use goniofit::render::{Film, Materials, Options, Plan, Scene, SceneSpec, Strategy, render};
 
 fn build(spec: &SceneSpec, folder: &Path) -> Scene {
     Scene::build(spec, folder, &Materials::new()).unwrap_or_else(|e| panic!("{e}"))
@@ -45,8 +45,11 @@ fn hard_case_a_scene_scaled_by_1e_minus_4_to_1e6_and_moved_by_1e6() {
     for name in ["sphere", "sphere-on-plane", "cornell"] {
         let plain = picture(&build(&builtin(name).expect("built in"), here), 48, 64, 1);
         for (scale, moved) in [(1e-4, DVec3::ZERO), (1e-4, DVec3::X), (1e6, DVec3::ZERO), (1e6, far), (1.0, far)] {
-            let film = picture(&build(&transformed(name, scale, moved), here), 48, 64, 2);
-            same(&film, &plain, &format!("{name} × {scale:e} + {moved}"));
+            let built = build(&transformed(name, scale, moved), here);
+            for plan in both_ways(&built) {
+                let what = format!("{name} × {scale:e} + {moved}, packets {}", plan.packets);
+                same(&picture_by(plan, &built, 48, 64, 2), &plain, &what);
+            }
         }
     }
     let plain = picture(&build(&builtin("mesh-env").expect("built in"), here), 48, 64, 1);
@@ -191,19 +194,26 @@ fn hard_case_a_camera_inside_a_sphere() {
     // Anywhere inside, even where the wall is an ulp away, the inside of a sphere is black.
     for height in [0.0, 0.9, 1.0 - 1e-9, 1.0f64.next_down()] {
         for look in [1.0, -1.0] {
-            let film = picture(&scene(&world(height, look)), 32, 4, 1);
-            assert_eq!((film.not_finite, mean(&film).0), (0, DVec3::ZERO), "height {height:?}, look {look}");
+            let built = scene(&world(height, look));
+            for plan in both_ways(&built) {
+                let film = picture_by(plan, &built, 32, 4, 1);
+                let found = (film.not_finite, mean(&film).0);
+                assert_eq!(found, (0, DVec3::ZERO), "height {height:?}, look {look}, packets {}", plan.packets);
+            }
         }
     }
     // Outside it is lit, however near: the top under parallel light from above.
     for gap in [1e-3, 1e-6, 1e-9, 1e-12] {
-        let lit = world(1.0 + gap, -1.0).replace("[1e20, 1e20, 1e20]", "[0, 0, 0]");
-        let film = picture(&scene(&lit), 16, 16, 1);
+        let lit = scene(&world(1.0 + gap, -1.0).replace("[1e20, 1e20, 1e20]", "[0, 0, 0]"));
         let want = DVec3::new(0.8, 0.5, 0.2) / PI;
-        for (x, y) in (0..16).flat_map(|y| (0..16).map(move |x| (x, y))) {
-            let got = film.radiance(x, y).expect("a pixel");
-            // What is seen lies within 2·gap of the top: the cosine there is at least 1 − 2·gap².
-            assert!(excess(got, want, (2.0 * gap * gap + 1e-9) * want) <= 1.0, "gap {gap:e}: {got} vs {want}");
+        // What is seen lies within 2·gap of the top: the cosine there is at least 1 − 2·gap².
+        let bound = (2.0 * gap * gap + 1e-9) * want;
+        for plan in both_ways(&lit) {
+            let film = picture_by(plan, &lit, 16, 16, 1);
+            for (x, y) in (0..16).flat_map(|y| (0..16).map(move |x| (x, y))) {
+                let got = film.radiance(x, y).expect("a pixel");
+                assert!(excess(got, want, bound) <= 1.0, "gap {gap:e}, packets {}: {got} vs {want}", plan.packets);
+            }
         }
     }
 }
@@ -328,12 +338,16 @@ fn hard_case_a_lobe_of_exponent_1e6_under_a_small_square_light() {
             toml(h * u),
             toml(h * v)
         );
-        let (got, noise) = one_pixel(&scene(&text), 20_000);
+        let built = scene(&text);
         let want = DVec3::new(1.0, 0.5, 0.1) * lobe_over_square(n, h, 10.0, cos);
-        // cosθ varies over the lobe or the light by its slope, whose mean is 0, and by half its square.
-        let bound = 5.0 * noise + (1e-5 + 1e-3 * h) * want;
-        assert!(excess(got, want, bound) <= 1.0, "half-edge {h:e}: {got} ± {noise} vs {want}");
-        assert!((noise / got).max_element() < 0.05, "half-edge {h:e}: noise {noise} of {got}");
+        for plan in both_ways(&built) {
+            let (got, noise) = one_pixel_by(plan, &built, 20_000);
+            let what = format!("half-edge {h:e}, packets {}", plan.packets);
+            // cosθ varies over the lobe or the light by its slope, whose mean is 0, and by half its square.
+            let bound = 5.0 * noise + (1e-5 + 1e-3 * h) * want;
+            assert!(excess(got, want, bound) <= 1.0, "{what}: {got} ± {noise} vs {want}");
+            assert!((noise / got).max_element() < 0.05, "{what}: noise {noise} of {got}");
+        }
     }
 }
 
@@ -345,34 +359,48 @@ fn hard_case_near_mirror_interreflection() {
                    [[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"m\"\n\
                    [[plane]]\npoint = [0, 1, 0]\nnormal = [0, -1, 0]\nmaterial = \"m\"\n";
     let lamp = "[[light.quad]]\ncenter = [10, 0.5, 0]\nu = [0, 0, 1]\nv = [0, 0.5, 0]\nradiance = [1e5, 1e5, 1e5]\n";
-    let camera = |bounces| spot_camera(DVec3::new(0.0, 0.5, 0.0), DVec3::new(1.0, -0.5, 0.0), bounces);
+    let of = |bounces| {
+        let camera = spot_camera(DVec3::new(0.0, 0.5, 0.0), DVec3::new(1.0, -0.5, 0.0), bounces);
+        scene(&format!("{camera}{mirrors}{lamp}"))
+    };
     let each = DVec3::new(0.95, 0.9, 0.5) * (1e6 + 2.0) / (1e6 + 1.0) * f64::sqrt(0.5);
     let want = 1e5 * each.powf(10.0);
-    let (got, noise) = one_pixel(&scene(&format!("{}{mirrors}{lamp}", camera(20))), 200_000);
-    assert!(excess(got, want, 5.0 * noise + 1e-4 * want) <= 1.0, "{got} ± {noise} vs {want}");
-    assert!((noise / got).x < 0.05, "{got} ± {noise}");
+    let (enough, too_few) = (of(20), of(9));
+    for plan in both_ways(&enough) {
+        let (got, noise) = one_pixel_by(plan, &enough, 200_000);
+        assert!(excess(got, want, 5.0 * noise + 1e-4 * want) <= 1.0, "{plan:?}: {got} ± {noise} vs {want}");
+        assert!((noise / got).x < 0.05, "{plan:?}: {got} ± {noise}");
+    }
     // One reflection fewer than it takes: nothing arrives, but for the tail of lobes that skips one.
-    let (dark, _) = one_pixel(&scene(&format!("{}{mirrors}{lamp}", camera(9))), 10_000);
-    assert!(dark.max_element() <= 1e-6 * want.max_element(), "{dark} vs {want}");
+    for plan in both_ways(&too_few) {
+        let (dark, _) = one_pixel_by(plan, &too_few, 10_000);
+        assert!(dark.max_element() <= 1e-6 * want.max_element(), "{plan:?}: {dark} vs {want}");
+    }
+}
 
-    // In a right angle of two near-mirrors light comes back the way that it came: two reflections of the surround.
+#[test]
+fn hard_case_near_mirrors_at_a_right_angle() {
+    // Light comes back the way that it came: two reflections of the surround.
     for theta in [0.3, 0.8, 1.3f64] {
         let at = DVec3::new(1.0, 0.0, 0.0);
-        let text = format!(
+        let built = scene(&format!(
             "{}[materials]\nm = {{ phong = [{{ ks = [0.95, 0.9, 0.5], n = 1e6 }}] }}\n\
              [[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"m\"\n\
              [[plane]]\npoint = [0, 0, 0]\nnormal = [1, 0, 0]\nmaterial = \"m\"\n[light.environment]\nradiance = [1, 1, 1]\n",
             spot_camera(at + 3.0 * DVec3::new(theta.sin(), theta.cos(), 0.0), at, 2)
-        );
-        let (got, noise) = one_pixel(&scene(&text), 20_000);
+        ));
         let once = DVec3::new(0.95, 0.9, 0.5) * (1e6 + 2.0) / (1e6 + 1.0);
         let want = once * once * theta.sin() * theta.cos();
-        // The slopes of the two cosines go together: (10⁻³)², and the same for their squares.
-        assert!(excess(got, want, 5.0 * noise + 1e-5 * want) <= 1.0, "θ {theta}: {got} ± {noise} vs {want}");
+        for plan in both_ways(&built) {
+            let (got, noise) = one_pixel_by(plan, &built, 20_000);
+            // The slopes of the two cosines go together: (10⁻³)², and the same for their squares.
+            let bound = 5.0 * noise + 1e-5 * want;
+            assert!(excess(got, want, bound) <= 1.0, "θ {theta}, {plan:?}: {got} ± {noise} vs {want}");
+        }
     }
 }
 
-/// A floor with a ball under one light of each kind, of this strength.
+/// A floor with a ball under one light of a kind, of this strength, or under none.
 fn under(kind: &str, gain: f64) -> String {
     let color = format!("[{:?}, {:?}, 0]", gain, 2.0 * gain);
     let light = match kind {
@@ -383,7 +411,8 @@ fn under(kind: &str, gain: f64) -> String {
         ),
         "quad" => format!("[[light.quad]]\ncenter = [0, 4, 0]\nu = [1, 0, 0]\nv = [0, 0, 1]\nradiance = {color}\n"),
         "sphere" => format!("[[light.sphere]]\ncenter = [2, 4, 2]\nradius = 0.5\nradiance = {color}\n"),
-        _ => format!("[light.environment]\nradiance = {color}\n"),
+        "environment" => format!("[light.environment]\nradiance = {color}\n"),
+        _ => String::new(),
     };
     format!(
         "version = 1\nname = \"strength\"\nmax_bounces = 8\n[camera]\nposition = [0, 2.5, 6]\ntarget = [0, 0.8, 0]\nfov_deg = 40\n\
@@ -394,45 +423,72 @@ fn under(kind: &str, gain: f64) -> String {
 
 const KINDS: [&str; 6] = ["point", "directional", "spot", "quad", "sphere", "environment"];
 
+/// What the scene calls for, by packets where they can walk through it, and everything one path at a time.
+fn plans(scene: &Scene) -> [Plan; 2] {
+    [Plan::of(scene), Plan::FULL]
+}
+
+/// Every value and standard error of a picture is that of another times `gain`.
+fn scales(scaled: &Film, plain: &Film, gain: f64, what: &str) {
+    assert_eq!(scaled.not_finite, 0, "{what} × {gain:e}");
+    let (scaled, plain) = (scaled.to_image(), plain.to_image());
+    let errors = scaled.standard_error.iter().flatten().zip(plain.standard_error.iter().flatten());
+    for (got, want) in scaled.radiance.iter().zip(&plain.radiance).chain(errors) {
+        for c in 0..3 {
+            assert!(
+                (got[c] - gain * want[c]).abs() <= 1e-6 * gain * (want[c] + 1e-9), // an error may be rounding alone
+                "{what} × {gain:e}: {got:?}, {want:?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn hard_case_lights_of_1e_minus_20_and_1e20() {
     for kind in KINDS {
-        let of = |gain| picture(&scene(&under(kind, gain)), 16, 16, 2);
-        let one = of(1.0);
-        assert!(mean(&one).0.x > 1e-3, "{kind}");
-        for gain in [1e-20, 1e20] {
-            let film = of(gain);
-            assert_eq!(film.not_finite, 0, "{kind} × {gain:e}");
-            let (scaled, plain) = (film.to_image(), one.to_image());
-            let errors = scaled.standard_error.iter().flatten().zip(plain.standard_error.iter().flatten());
-            for (got, want) in scaled.radiance.iter().zip(&plain.radiance).chain(errors) {
-                for c in 0..3 {
-                    assert!(
-                        (got[c] - gain * want[c]).abs() <= 1e-6 * gain * (want[c] + 1e-9), // an error may be rounding alone
-                        "{kind} × {gain:e}: {got:?}, {want:?}"
-                    );
-                }
-            }
+        let [one, weak, strong] = [1.0, 1e-20, 1e20].map(|gain| scene(&under(kind, gain)));
+        for plan in plans(&one) {
+            let what = format!("{kind}, {plan:?}");
+            let plain = picture_by(plan, &one, 16, 16, 2);
+            assert!(mean(&plain).0.x > 1e-3, "{what}");
+            scales(&picture_by(plan, &weak, 16, 16, 2), &plain, 1e-20, &what);
+            scales(&picture_by(plan, &strong, 16, 16, 2), &plain, 1e20, &what);
         }
+    }
+}
+
+#[test]
+fn hard_case_no_light_at_all() {
+    let built = scene(&under("none", 1.0));
+    for plan in both_ways(&built) {
+        let film = picture_by(plan, &built, 32, 16, 2);
+        assert!(film.to_image().radiance.iter().flatten().all(|x| *x == 0.0), "{plan:?}");
+        assert_eq!((film.not_finite, mean(&film)), (0, (DVec3::ZERO, DVec3::ZERO)), "{plan:?}");
     }
 }
 
 #[test]
 fn hard_case_a_black_scene_and_lights_of_zero() {
     for kind in KINDS {
-        let dark = picture(&scene(&under(kind, 0.0)), 16, 16, 2);
-        assert_eq!((dark.not_finite, mean(&dark)), (0, (DVec3::ZERO, DVec3::ZERO)), "{kind}");
+        let dark = scene(&under(kind, 0.0));
         let black = under(kind, 1.0)
             .replace(
                 "kd = [0.3, 0.3, 0.3], phong = [{ ks = [0.5, 0.5, 0.5], n = 1e3 }]",
                 "kd = [0, 0, 0], phong = [{ ks = [0, 0, 0], n = 1e3 }]",
             )
             .replace("kd = [0.4, 0.4, 0.4]", "black = true");
-        let film = picture(&scene(&black), 16, 16, 2);
-        // The lower half sees nothing but the ball and the floor.
-        for (x, y) in (8..16).flat_map(|y| (0..16).map(move |x| (x, y))) {
-            assert_eq!(film.radiance(x, y), Some(DVec3::ZERO), "{kind}, pixel {x} {y}");
+        let black = scene(&black);
+        for plan in plans(&dark) {
+            let film = picture_by(plan, &dark, 16, 16, 2);
+            assert_eq!((film.not_finite, mean(&film)), (0, (DVec3::ZERO, DVec3::ZERO)), "{kind}, {plan:?}");
         }
-        assert_eq!(film.not_finite, 0);
+        for plan in plans(&black) {
+            let film = picture_by(plan, &black, 16, 16, 2);
+            // The lower half sees nothing but the ball and the floor.
+            for (x, y) in (8..16).flat_map(|y| (0..16).map(move |x| (x, y))) {
+                assert_eq!(film.radiance(x, y), Some(DVec3::ZERO), "{kind}, {plan:?}, pixel {x} {y}");
+            }
+            assert_eq!(film.not_finite, 0, "{kind}, {plan:?}");
+        }
     }
 }
