@@ -3,21 +3,37 @@
 #![allow(clippy::expect_used, clippy::panic, clippy::float_cmp)] // these are tests
 
 mod common;
+mod furnace_support;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
 
-use common::{excess, mean, picture, scene};
+use common::{excess, mean, picture, picture_by, scene};
+use furnace_support::Opaque;
 use glam::DVec3;
-use goniofit::control::Control;
-use goniofit::image::compare;
+use goniofit::brdf::Reflectance;
+use goniofit::image::{Image, compare, encode_exr};
 use goniofit::numeric::random::{Purpose, RngExt, Stream, stream};
-use goniofit::render::{Film, Options, Plan, Scene, render};
+use goniofit::render::{Film, Material, Materials, Plan, Scene, SceneSpec};
 
 /// The picture by the full integrator.
 fn full(scene: &Scene, size: u32, samples: u32, seed: u64) -> Film {
-    let options = Options { width: size, height: size, samples, seed, plan: Some(Plan::FULL), ..Options::default() };
-    render(scene, &options, Control::silent()).expect("options are in range")
+    picture_by(Plan::FULL, scene, size, samples, seed)
+}
+
+/// Pixel by pixel and block by block, as `compare` tests pictures, both at this level.
+fn same(by_plan: &Film, by_all: &Film, level: f64, what: &str) {
+    assert_eq!((by_plan.not_finite, by_all.not_finite), (0, 0), "{what}");
+    let (by_plan, by_all) = (by_plan.to_image(), by_all.to_image());
+    let Some(found) = compare(&by_plan, &by_all).expect("pictures of one size").significance else {
+        assert_eq!(by_plan.radiance, by_all.radiance, "without noise: {what}");
+        return;
+    };
+    let (z, at, block) = (found.max_z, found.at, found.block);
+    let (p, p_blocks) = (found.p, found.blocks.p);
+    assert!(p > level && p_blocks > level, "{z} σ at {at:?}, block {block}: p {p:e}, {p_blocks:e}: {what}");
 }
 
 fn number(rng: &mut Stream, low: f64, high: f64) -> f64 {
@@ -28,26 +44,43 @@ fn triple(rng: &mut Stream, low: f64, high: f64) -> String {
     format!("[{:.3}, {:.3}, {:.3}]", number(rng, low, high), number(rng, low, high), number(rng, low, high))
 }
 
-/// A scene of a few shapes under a few lights.
+/// True once in so many times.
+fn once_in(rng: &mut Stream, times: u32) -> bool {
+    rng.random_range(0..times) == 0
+}
+
+/// A scene of a few shapes under a few lights. Where it is called "opaque", its material "a" is to tell no one that it is
+/// a sum of lobes.
 fn generated(rng: &mut Stream) -> String {
+    let name = if once_in(rng, 8) { "opaque" } else { "generated" };
     let bounces = 1 + rng.random_range(0..4u32);
-    let mut text = format!(
-        "version = 1\nname = \"generated\"\nmax_bounces = {bounces}\n[camera]\nposition = [0, 1.5, 6]\n\
-         target = [0, 0.7, 0]\nfov_deg = 40\n"
+    let lens = if once_in(rng, 4) { "lens_radius = 0.2\n" } else { "" };
+    let head = format!(
+        "version = 1\nname = \"{name}\"\nmax_bounces = {bounces}\n[camera]\nposition = [0, 1.5, 6]\n\
+         target = [0, 0.7, 0]\nfov_deg = 40\n{lens}"
     );
-    if rng.random_range(0..4u32) == 0 {
-        text += "lens_radius = 0.2\n";
-    }
-    text += "[materials]\n";
+    head + &materials(rng) + &shapes(rng) + &lights(rng)
+}
+
+/// Two materials, diffuse or with a lobe of exponent 0.1 to 1000.
+fn materials(rng: &mut Stream) -> String {
+    let mut text = String::from("[materials]\n");
     for name in ["a", "b"] {
-        let phong = match rng.random_range(0..2u32) {
-            0 => String::new(),
-            _ => format!(", phong = [{{ ks = {}, n = {:.1} }}]", triple(rng, 0.1, 0.5), number(rng, 0.0, 80.0)),
+        let lobe = if once_in(rng, 2) {
+            String::new()
+        } else {
+            format!("{{ ks = {}, n = {:.2} }}", triple(rng, 0.1, 0.5), 10f64.powf(number(rng, -1.0, 3.0)))
         };
-        let _ = writeln!(text, "{name} = {{ kd = {}{phong} }}", triple(rng, 0.05, 0.5));
+        let _ = writeln!(text, "{name} = {{ kd = {}, phong = [{lobe}] }}", triple(rng, 0.05, 0.5));
     }
-    let shapes = [0u32, 1, 1, 2, 3][rng.random_range(0..5usize)];
-    for _ in 0..shapes.max(1) {
+    text
+}
+
+/// A ball alone, or one to three with perhaps a floor, a tetrahedron and a wall.
+fn shapes(rng: &mut Stream) -> String {
+    let mut text = String::new();
+    let count = [0u32, 1, 1, 2, 3][rng.random_range(0..5usize)];
+    for _ in 0..count.max(1) {
         let _ = writeln!(
             text,
             "[[sphere]]\ncenter = [{:.3}, {:.3}, {:.3}]\nradius = {:.3}\nmaterial = \"{}\"",
@@ -58,12 +91,29 @@ fn generated(rng: &mut Stream) -> String {
             if rng.random::<bool>() { "a" } else { "b" }
         );
     }
-    if shapes > 0 && rng.random::<bool>() {
+    if count > 0 && rng.random::<bool>() {
         text += "[[plane]]\npoint = [0, -0.5, 0]\nnormal = [0, 1, 0]\nmaterial = \"b\"\n";
     }
-    if shapes > 1 && rng.random::<bool>() {
+    if count > 0 && once_in(rng, 6) {
+        let _ = writeln!(
+            text,
+            "[[mesh]]\nfile = \"tetrahedron.obj\"\nmaterial = \"a\"\n[[mesh.instance]]\nscale = {:.3}\naxis = {}\n\
+             rotate_deg = {:.1}\ntranslate = {}",
+            number(rng, 0.3, 0.7),
+            triple(rng, 0.1, 1.0),
+            number(rng, 0.0, 360.0),
+            triple(rng, -0.5, 1.0)
+        );
+    }
+    if count > 1 && rng.random::<bool>() {
         text += "[[quad]]\ncenter = [0, 1, -2]\nu = [2, 0, 0]\nv = [0, 1.5, 0]\nmaterial = \"a\"\n";
     }
+    text
+}
+
+/// Lights of all kinds, some of them or none.
+fn lights(rng: &mut Stream) -> String {
+    let mut text = String::new();
     let lights = rng.random_range(1..64u32);
     if lights & 1 == 1 {
         let _ = writeln!(
@@ -83,29 +133,64 @@ fn generated(rng: &mut Stream) -> String {
         );
     }
     if lights & 0b1_1000 == 0b1_1000 {
-        text += "[light.environment]\nradiance = [0.3, 0.2, 0.4]\n";
+        let sky = if once_in(rng, 3) { "file = \"sky.exr\"" } else { "radiance = [0.3, 0.2, 0.4]" };
+        let _ = writeln!(text, "[light.environment]\n{sky}");
     }
     if lights & 0b11_0000 == 0b11_0000 {
         text += "[[light.sphere]]\ncenter = [-3, 3, 2]\nradius = 0.4\nradiance = [5, 5, 5]\n";
     }
+    if once_in(rng, 8) {
+        let (x, inner, outer) = (number(rng, -2.0, 2.0), number(rng, 2.0, 10.0), number(rng, 12.0, 30.0));
+        let _ = writeln!(
+            text,
+            "[[light.spot]]\nposition = [{x:.3}, 4, 2]\ndirection = [{:.3}, -3.3, -2]\nintensity = [30, 25, 20]\n\
+             inner_deg = {inner:.1}\nouter_deg = {outer:.1}",
+            -x
+        );
+    }
     text
+}
+
+/// What generated scenes ask for: a tetrahedron about the origin, and a sky of 8 × 4 pixels, one of them bright.
+fn write_files(folder: &Path) {
+    let tetrahedron = "v 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n";
+    std::fs::write(folder.join("tetrahedron.obj"), tetrahedron).expect("written");
+    let pixel = |i: usize| if i == 10 { [5.0, 4.0, 3.0] } else { [0.1, 0.2, 0.03 * (i % 8) as f64] };
+    let sky = Image { width: 8, height: 4, radiance: (0..32).map(pixel).collect(), ..Image::default() };
+    std::fs::write(folder.join("sky.exr"), encode_exr(&sky).expect("encodes")).expect("written");
+}
+
+/// A generated scene, whose files lie in the folder.
+fn build(text: &str, folder: &Path) -> Scene {
+    let spec = SceneSpec::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let materials = if spec.name == "opaque" { opaque(&spec, "a") } else { Materials::new() };
+    Scene::build(&spec, folder, &materials).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// The material of this name, of which the tracer doesn't know that it is a sum of lobes.
+fn opaque(spec: &SceneSpec, name: &str) -> Materials {
+    let own = &spec.materials[name];
+    let phong = own.phong.iter().map(|lobe| (lobe.ks.to_vec(), lobe.n));
+    let lobes = Reflectance::lobes(own.kd.unwrap_or_default().to_vec(), phong);
+    Materials::from([(name.to_owned(), Material::Brdf(Arc::new(Opaque(Arc::new(lobes)))))])
 }
 
 #[test]
 fn every_plan_shows_what_the_full_integrator_shows() {
+    let folder = tempfile::tempdir().expect("folder");
+    write_files(folder.path());
     let mut plans = BTreeSet::new();
     let mut rng = stream(11, Purpose::Study, 0);
-    for case in 0..60 {
+    let cases = 80;
+    for case in 0..cases {
         let text = generated(&mut rng);
-        let built = scene(&text);
+        let built = build(&text, folder.path());
         let plan = Plan::of(&built);
         plans.insert([plan.shadows, plan.interreflection, plan.chance, plan.closed_forms, plan.packets]);
-        let (by_plan, noise) = mean(&picture(&built, 24, 64, 2 * case));
-        let (by_all, full_noise) = mean(&full(&built, 24, 64, 2 * case + 1));
-        // 180 tests: 5 σ by chance once in ten thousand runs.
-        let bound = 5.0 * (noise * noise + full_noise * full_noise).map(f64::sqrt);
-        let off = excess(by_plan, by_all, bound + 1e-12 * by_all.abs());
-        assert!(off <= 1.0, "case {case}, {plan:?}: {by_plan} ± {noise} against {by_all} ± {full_noise}\n{text}");
+        let (by_plan, by_all) = (picture(&built, 24, 64, 2 * case), full(&built, 24, 64, 2 * case + 1));
+        // 1 % for both tests of all cases together.
+        let level = 0.005 / f64::from(cases as u32);
+        same(&by_plan, &by_all, level, &format!("case {case}, {plan:?}\n{text}"));
     }
     assert!(plans.len() >= 10, "too few kinds of plans: {plans:?}");
     for k in 0..5 {
@@ -171,7 +256,6 @@ fn boxed(rng: &mut Stream) -> String {
     text
 }
 
-/// Pixel by pixel and block by block, as `compare` tests pictures.
 #[test]
 fn boxes_lamps_and_black_pieces_look_as_by_the_full_integrator() {
     let mut plans = BTreeSet::new();
@@ -184,16 +268,9 @@ fn boxes_lamps_and_black_pieces_look_as_by_the_full_integrator() {
         assert!(plan.packets, "{plan:?}");
         plans.insert([plan.shadows, plan.interreflection, plan.chance, plan.closed_forms]);
         let (by_plan, by_all) = (picture(&built, 32, 64, 2 * case), full(&built, 32, 64, 2 * case + 1));
-        let found = compare(&by_plan.to_image(), &by_all.to_image()).expect("pictures of one size");
-        let found = found.significance.expect("standard errors are known");
-        // 1 % for all cases together.
-        let level = 0.01 / f64::from(cases as u32);
-        let (z, at) = (found.max_z, found.at);
-        assert!(
-            found.p > level && found.blocks.p > level,
-            "case {case}, {plan:?}: {z} σ at {at:?}, p {:e}\n{text}",
-            found.p
-        );
+        // 1 % for both tests of all cases together.
+        let level = 0.005 / f64::from(cases as u32);
+        same(&by_plan, &by_all, level, &format!("case {case}, {plan:?}\n{text}"));
     }
     assert!(plans.len() >= 2, "too few kinds of plans: {plans:?}");
 }
@@ -344,11 +421,8 @@ fn closed_forms_of_lobes_show_what_the_full_integrator_shows() {
         let plan = Plan::of(&built);
         assert!(plan.packets && plan.closed_forms && plan.chance != (case % 2 == 0), "{plan:?}\n{text}");
         let (by_plan, by_all) = (picture(&built, 32, 64, 2 * case), full(&built, 32, 64, 2 * case + 1));
-        let found = compare(&by_plan.to_image(), &by_all.to_image()).expect("pictures of one size");
-        let found = found.significance.expect("standard errors are known");
         // 1 % for both tests of all cases together.
-        let (z, at) = (found.max_z, found.at);
-        assert!(found.p > 6e-4 && found.blocks.p > 6e-4, "case {case}: {z} σ at {at:?}, p {:e}\n{text}", found.p);
+        same(&by_plan, &by_all, 6e-4, &format!("case {case}\n{text}"));
     }
 }
 

@@ -155,7 +155,8 @@ impl Case {
     }
 }
 
-struct Opaque(Arc<dyn Brdf>);
+/// A BRDF that tells no one what it is made of.
+pub struct Opaque(pub Arc<dyn Brdf>);
 
 impl Brdf for Opaque {
     fn channels(&self) -> usize {
