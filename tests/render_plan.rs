@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{excess, mean, picture, picture_by, scene};
+use common::{both_ways, excess, mean, picture, picture_by, scene};
 use furnace_support::Opaque;
 use glam::DVec3;
 use goniofit::brdf::Reflectance;
@@ -302,6 +302,62 @@ fn without_sampling_plans_agree_to_rounding() {
         // A ray that just grazes the outline may miss it by rounding.
         assert!(far <= 1, "{far} pixels differ\n{text}");
     }
+}
+
+/// A floor, a tilted wall and two balls, which may cut each other, under a point and parallel light that they hide from
+/// each other.
+fn hard_shadows(rng: &mut Stream) -> String {
+    let mut text = format!(
+        "version = 1\nname = \"shadows\"\nmax_bounces = 1\n[camera]\nposition = [0, 2, 5]\ntarget = [0, 0.5, 0]\n\
+         fov_deg = 40\nlens_radius = 0.1\n[materials]\na = {{ kd = {}, phong = [{{ ks = {}, n = {:.2} }}] }}\nb = {{ kd = {} }}\n\
+         [[plane]]\npoint = [0, 0, 0]\nnormal = [0.05, 1, 0.02]\nmaterial = \"b\"\n\
+         [[quad]]\ncenter = [{:.3}, 0.8, -1]\nu = [0.9, 0.1, {:.3}]\nv = [0.2, 0.7, {:.3}]\nmaterial = \"a\"\n\
+         [[light.point]]\nposition = {}\nintensity = [9, 8, 7]\n[[light.directional]]\n\
+         toward = [{:.3}, 2, 1.5]\nirradiance = [1, 2, 3]\n",
+        triple(rng, 0.1, 0.5),
+        triple(rng, 0.1, 0.5),
+        number(rng, 0.0, 500.0),
+        triple(rng, 0.1, 0.5),
+        number(rng, -0.8, 0.8),
+        number(rng, -0.5, 0.5),
+        number(rng, -0.5, 0.5),
+        triple(rng, 1.5, 3.0),
+        number(rng, -2.0, 1.0)
+    );
+    for (x, material) in [(-0.6, "a"), (0.6, "b")] {
+        let (x, y, z) = (x + number(rng, -0.3, 0.3), number(rng, 0.2, 0.8), number(rng, -0.5, 0.7));
+        let _ = writeln!(
+            text,
+            "[[sphere]]\ncenter = [{x:.3}, {y:.3}, {z:.3}]\nradius = {:.3}\nmaterial = \"{material}\"",
+            number(rng, 0.3, 0.6)
+        );
+    }
+    text
+}
+
+/// One sample a pixel, so that no mean evens anything out. A point that lies within rounding of an outline or a shadow's edge,
+/// 10⁻¹² of a pixel say, may fall on either side of it: hardly one of a million.
+#[test]
+fn without_sampling_hard_shadows_agree_to_rounding() {
+    let mut rng = stream(16, Purpose::Study, 0);
+    let (mut far, mut hidden, mut all) = (0, 0, 0);
+    for _ in 0..20 {
+        let text = hard_shadows(&mut rng);
+        let built = scene(&text);
+        let [derived, everything] = both_ways(&built);
+        assert!(derived.shadows && !derived.interreflection && !derived.chance, "{derived:?}\n{text}");
+        let of = |plan| picture_by(plan, &built, 48, 1, 1);
+        let (by_plan, by_all, open) = (of(derived), of(everything), of(Plan { shadows: false, ..derived }));
+        for (x, y) in (0..48).flat_map(|y| (0..48).map(move |x| (x, y))) {
+            let [p, q, lit] = [&by_plan, &by_all, &open].map(|film| film.radiance(x, y).expect("pixel"));
+            far += u32::from(excess(p, q, 1e-9 * q.abs() + DVec3::splat(1e-15)) > 1.0);
+            hidden += u32::from(lit != p);
+            all += 1;
+        }
+    }
+    println!("{far} of {all} pixels differ, {hidden} have shadows");
+    assert!(far <= 3, "{far} of {all} pixels differ");
+    assert!(hidden > all / 50, "{hidden} of {all} pixels have shadows");
 }
 
 /// What has a closed form has no noise but that of the outline, and the value that sampling finds.
