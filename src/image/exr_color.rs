@@ -3,10 +3,12 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use exr::meta::header::Header;
 use exr::prelude as ex;
 use exr::prelude::{ReadChannels, ReadLayers};
 
 use super::ImageError;
+use super::exr_header::{check_length, check_pixels};
 
 /// Linear RGB pixels along rows, row 0 on top.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,9 +28,13 @@ pub struct ColorGrid {
 /// [`ImageError`] naming the file and what was expected.
 pub fn read_exr_colors(path: &Path, most: u64) -> Result<ColorGrid, ImageError> {
     let bytes = std::fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })?;
+    let length = bytes.len();
     let invalid =
-        |e: &exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
-    check_headers(path, &bytes, most)?;
+        |e: exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
+    let chunks = exr::block::read(Cursor::new(bytes), false).map_err(invalid)?;
+    check_pixels(path, chunks.headers(), most)?;
+    check_length(path, chunks.headers(), length)?;
+    check_channels(path, chunks.headers())?;
     let create = |size: ex::Vec2<usize>, _: &_| ColorGrid {
         width: size.width(),
         height: size.height(),
@@ -41,31 +47,19 @@ pub fn read_exr_colors(path: &Path, most: u64) -> Result<ColorGrid, ImageError> 
         }
     };
     let channels = ex::read().no_deep_data().largest_resolution_level().rgb_channels(create, set);
-    let file = channels.first_valid_layer().all_attributes().non_parallel().from_buffered(Cursor::new(bytes));
-    Ok(file.map_err(|e| invalid(&e))?.layer_data.channel_data.pixels)
+    let file = channels.first_valid_layer().all_attributes().non_parallel().from_chunks(chunks);
+    Ok(file.map_err(invalid)?.layer_data.channel_data.pixels)
 }
 
-/// Refuses what has no R, G and B, or more pixels than there may be.
-fn check_headers(path: &Path, bytes: &[u8], most: u64) -> Result<(), ImageError> {
-    let invalid = |reason: String| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason };
-    let unsupported = |expected: String, found: String| ImageError::Unsupported { path: path.into(), expected, found };
-    let meta = ex::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| invalid(e.to_string()))?;
-    for header in &meta.headers {
-        let size = header.layer_size;
-        if size.width() as u64 > most || (size.width() as u64).saturating_mul(size.height() as u64) > most {
-            let found = format!("{} x {}", size.width(), size.height());
-            return Err(unsupported(format!("at most {most} pixels"), found));
-        }
-    }
-    let names = |header: &exr::meta::header::Header| {
-        header.channels.list.iter().map(|c| c.name.to_string()).collect::<Vec<_>>()
-    };
+/// Refuses what has no R, G and B.
+fn check_channels(path: &Path, headers: &[Header]) -> Result<(), ImageError> {
+    let names = |header: &Header| header.channels.list.iter().map(|c| c.name.to_string()).collect::<Vec<_>>();
     let has_rgb = |header| ["R", "G", "B"].iter().all(|c| names(header).iter().any(|n| n == c));
-    if meta.headers.iter().any(has_rgb) {
+    if headers.iter().any(has_rgb) {
         return Ok(());
     }
-    let found = meta.headers.iter().flat_map(names).collect::<Vec<_>>().join(", ");
-    Err(unsupported("channels R, G and B".into(), format!("channels {found}")))
+    let found = format!("channels {}", headers.iter().flat_map(names).collect::<Vec<_>>().join(", "));
+    Err(ImageError::Unsupported { path: path.into(), expected: "channels R, G and B".into(), found })
 }
 
 #[cfg(test)]

@@ -5,12 +5,14 @@
 //! Values are written as 32-bit floats, compressed without loss; how the picture came about stands in text attributes named
 //! `goniofit.…`.
 
+use std::io::Cursor;
 use std::path::Path;
 
 use exr::prelude as ex;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 
-use super::{Image, ImageError, Layer, LayerKind, Metadata};
+use super::exr_header::{check_length, check_pixels, check_values};
+use super::{Image, ImageError, Layer, LayerKind, MAX_PIXELS, Metadata};
 
 type Channel = ex::AnyChannel<ex::FlatSamples>;
 type Attributes = std::collections::HashMap<ex::Text, ex::AttributeValue>;
@@ -33,13 +35,15 @@ pub fn encode_exr(image: &Image) -> Result<Vec<u8>, ImageError> {
         encoding,
         ex::AnyChannels::sort(channels.into_iter().collect()),
     );
-    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut bytes = Cursor::new(Vec::new());
     let refused = |e: exr::error::Error| ImageError::Encode { format: "OpenEXR", reason: e.to_string() };
     ex::Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(refused)?;
     Ok(bytes.into_inner())
 }
 
 /// Reads a picture: its first layer that has `R`, `G` and `B` (or `Y` alone), and the layers written by [`encode_exr`].
+/// More pixels than [`MAX_PIXELS`], or more values than the largest picture with all layers has, are refused by the
+/// header, before there is room made for them.
 ///
 /// # Errors
 /// [`ImageError`] naming the file and what was expected.
@@ -52,10 +56,7 @@ pub fn read_exr(path: &Path) -> Result<Image, ImageError> {
 /// # Errors
 /// As [`read_exr`].
 pub fn decode_exr(path: &Path, bytes: Vec<u8>) -> Result<Image, ImageError> {
-    let invalid =
-        |e: &exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
-    let read = ex::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    let file = read.non_parallel().from_buffered(std::io::Cursor::new(bytes)).map_err(|e| invalid(&e))?;
+    let file = read_all(path, bytes)?;
     let found = || file.layer_data.iter().flat_map(|l| &l.channel_data.list).map(|c| c.name.to_string());
     let unsupported = || ImageError::Unsupported {
         path: path.into(),
@@ -73,6 +74,26 @@ pub fn decode_exr(path: &Path, bytes: Vec<u8>) -> Result<Image, ImageError> {
         layers: LayerKind::ALL.into_iter().filter_map(|kind| further(list, kind)).collect(),
         metadata: metadata(&layer.attributes.other),
     })
+}
+
+/// All channels of all layers, if the header claims no more than there can be.
+fn read_all(path: &Path, bytes: Vec<u8>) -> Result<ex::FlatImage, ImageError> {
+    let invalid =
+        |e: exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
+    let length = bytes.len();
+    let chunks = exr::block::read(Cursor::new(bytes), false).map_err(invalid)?;
+    check_pixels(path, chunks.headers(), MAX_PIXELS)?;
+    check_values(path, chunks.headers(), MAX_PIXELS * most_channels())?;
+    check_length(path, chunks.headers(), length)?;
+    let read = ex::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+    read.non_parallel().from_chunks(chunks).map_err(invalid)
+}
+
+/// Channels of a picture with all that [`encode_exr`] writes. Other programs' pictures may have more of them, the smaller
+/// they are.
+fn most_channels() -> u64 {
+    let radiance_error_and_mask = 7;
+    radiance_error_and_mask + LayerKind::ALL.iter().map(|kind| kind.channels().len() as u64).sum::<u64>()
 }
 
 fn channels(image: &Image) -> Result<Vec<Channel>, ImageError> {
@@ -136,6 +157,7 @@ fn rgb(list: &[Channel], prefix: &str) -> Option<Vec<[f64; 3]>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::read_exr_colors;
 
     fn layer(kind: LayerKind) -> Layer {
         let plane = |c: usize| (0..12).map(|i| (i * 8 + c) as f64 * 0.5).collect();
@@ -200,10 +222,101 @@ mod tests {
         let plane = |name: &str| Channel::new(name, ex::FlatSamples::F32(vec![0.0; 4]));
         let list = ex::AnyChannels::sort(["G", "R", "depth.Z"].map(plane).into_iter().collect());
         let layer = ex::Layer::new((2, 2), ex::LayerAttributes::default(), ex::Encoding::default(), list);
-        let mut bytes = std::io::Cursor::new(Vec::new());
+        let mut bytes = Cursor::new(Vec::new());
         ex::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
         let error = decode_exr(Path::new("a.exr"), bytes.into_inner()).unwrap_err().to_string();
         assert_eq!(error, "a.exr: expected channels R, G, B, or Y alone, found channels G, R, depth.Z");
+    }
+
+    /// The file with another size in its header, whose optional count of blocks is renamed.
+    fn claiming(mut bytes: Vec<u8>, [width, height]: [i32; 2]) -> Vec<u8> {
+        let mut put = |attribute: &[u8], skip: usize, new: &[u8]| {
+            let start = bytes.windows(attribute.len()).position(|w| w == attribute).unwrap() + skip;
+            bytes[start..start + new.len()].copy_from_slice(new);
+        };
+        put(b"chunkCount\0", 0, b"otherCount\0");
+        let window = b"dataWindow\0box2i\0";
+        let least_corner_and_length = 4 + 8;
+        let greatest = [width - 1, height - 1].map(i32::to_le_bytes).concat();
+        put(window, window.len() + least_corner_and_length, &greatest);
+        bytes
+    }
+
+    /// A file of 2 × 2 pixels, all 0.
+    fn of_channels(names: &[String], compression: ex::Compression) -> Vec<u8> {
+        let plane = |name: &String| Channel::new(name.as_str(), ex::FlatSamples::F32(vec![0.0; 4]));
+        let list = ex::AnyChannels::sort(names.iter().map(plane).collect());
+        let encoding = ex::Encoding { compression, ..ex::Encoding::default() };
+        let layer = ex::Layer::new((2, 2), ex::LayerAttributes::default(), encoding, list);
+        let mut bytes = Cursor::new(Vec::new());
+        ex::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn more_than_the_largest_picture_is_refused_by_the_header() {
+        let refusal = |bytes| decode_exr(Path::new("a.exr"), bytes).unwrap_err();
+        let bytes = encode_exr(&example()).unwrap();
+        assert_eq!(decode_exr(Path::new("a.exr"), claiming(bytes.clone(), [4, 3])).unwrap(), example());
+        for size in [[1_000_000_000, 1_000_000_000], [8193, 8192], [1, (1 << 26) + 1], [(1 << 26) + 1, 1]] {
+            let error = refusal(claiming(bytes.clone(), size));
+            let want = format!("a.exr: expected at most 67108864 pixels, found {} x {}", size[0], size[1]);
+            assert!(matches!(error, ImageError::Unsupported { .. }), "{error:?}");
+            assert_eq!(error.to_string(), want);
+        }
+        let names = |count: usize| (0..count).map(|i| format!("c{i:02}")).collect::<Vec<_>>();
+        let channels = |count| refusal(claiming(of_channels(&names(count), ex::Compression::ZIP16), [8192, 8192]));
+        assert_eq!(
+            channels(26).to_string(),
+            "a.exr: expected at most 1677721600 values, found 1744830464: 8192 x 8192 pixels in 26 channels"
+        );
+        assert!(
+            matches!(channels(25), ImageError::Invalid { .. }),
+            "as many values as there may be, but not in this file"
+        );
+    }
+
+    #[test]
+    fn a_file_that_is_too_short_for_its_size_is_refused_by_the_header() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let names = ["R", "G", "B"].map(String::from);
+        for (compression, most) in [(ex::Compression::Uncompressed, 1), (ex::Compression::ZIP16, 1376)] {
+            let bytes = of_channels(&names, compression);
+            for [w, h] in [[1000, 1000], [8192, 8192], [1 << 26, 1], [1, 1 << 26]] {
+                std::fs::write(&path, claiming(bytes.clone(), [w, h])).unwrap();
+                let least = 12 * u64::from(w.unsigned_abs()) * u64::from(h.unsigned_abs()) / most;
+                let want = format!(
+                    "{}: not a valid OpenEXR file: its header says {w} x {h} pixels in 3 channels, which take \
+                     {least} bytes at least; the file holds {}",
+                    path.display(),
+                    bytes.len()
+                );
+                assert_eq!(read_exr(&path).unwrap_err().to_string(), want);
+                assert_eq!(read_exr_colors(&path, MAX_PIXELS).unwrap_err().to_string(), want);
+            }
+        }
+    }
+
+    #[test]
+    fn what_compresses_best_is_read() {
+        let compressions = {
+            use ex::Compression::{B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+            [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44A]
+        };
+        let (width, height) = (1024, 512);
+        for compression in compressions {
+            let plane = |name: &str| Channel::new(name, ex::FlatSamples::F32(vec![0.0; width * height]));
+            let list = ex::AnyChannels::sort(["R", "G", "B"].map(plane).into_iter().collect());
+            let encoding = ex::Encoding { compression, ..ex::Encoding::UNCOMPRESSED };
+            let layer = ex::Layer::new((width, height), ex::LayerAttributes::default(), encoding, list);
+            let mut bytes = Cursor::new(Vec::new());
+            ex::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+            let ratio = (12 * width * height) as f64 / bytes.get_ref().len() as f64;
+            let image = decode_exr(Path::new("black.exr"), bytes.into_inner());
+            let image = image.unwrap_or_else(|e| panic!("{compression:?}, {ratio} to 1: {e}"));
+            assert!(image.radiance.iter().all(|p| *p == [0.0; 3]), "{compression:?}");
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod delta_e;
 mod error;
 mod exr_color;
 mod exr_file;
+mod exr_header;
 mod filter;
 mod flip;
 mod hdr_flip;
@@ -35,6 +36,9 @@ pub use layers::{Layer, LayerKind};
 pub use maps::{comparison_sheet, difference, map_tiles};
 pub use significance::{BlockTest, Significance};
 pub use tone::{develop, exposure_for, srgb_encode};
+
+/// Pixels of a picture at most: 8192 × 8192, of those that are read and of those that are rendered.
+pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// A pixel of whose light a larger share is unknown is masked. The share is an expected value, so more samples find it more
 /// exactly, but no more pixels beyond it: a table with a small gap keeps its pixels, however long it is rendered.

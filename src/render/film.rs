@@ -23,8 +23,8 @@ use crate::image::{Image, Metadata};
 /// Samples that a tile's pixels get between two looks at the clock and the wish to stop.
 const PASS: u32 = 32;
 
-/// Pixels of a picture at most: 8192 × 8192, which takes about 12 GB, and with all of [`LayerSet::NAMED`] about 2.5 times that.
-pub const MAX_PIXELS: u64 = 1 << 26;
+/// Pixels of a picture at most, which take about 12 GB, and with all of [`LayerSet::NAMED`] about 2.5 times that.
+pub const MAX_PIXELS: u64 = crate::image::MAX_PIXELS;
 
 /// What to render.
 #[derive(Debug, Clone, Copy, PartialEq)]
