@@ -176,11 +176,24 @@ fn a_bad_mesh_file_says_where_and_what() {
     let cases = [
         ("v 0 0 0\nv 1 zero 0\nv 0 1 0\nf 1 2 3\n".to_owned(), "face", "line 2"),
         (format!("{triangle}f 1 2 three\n"), "face", "line 4"),
-        (format!("{triangle}f 1 2 9\n"), "face", "out of bounds"),
+        (format!("{triangle}f 1 2 3\nf 1 2 9\nf 1 2 3\n"), "face", "line 5: face vertex index out of bounds"),
         (format!("{triangle}f 1 2 3\n"), "vertex", "vertex normals"),
-        (format!("{triangle}vn 0 0 0\nf 1//1 2//1 3//1\n"), "vertex", "vertex normal 1"),
+        (
+            format!("{triangle}vn 0 0 0\nf 1//1 2//1 3//1\n"),
+            "vertex",
+            "line 5: the face has the vertex normal [0, 0, 0]",
+        ),
+        // Polygons, groups, points and lines stand before the face.
+        (
+            format!(
+                "{triangle}v 1 1 0\nvn 0 0 1\nvn 0 0 0\no a\nf 2//1 4//1 3//1 1//1\nl 1 2\np 1\nl 1//1 2//1 3//1\n\
+                 # f 1 2 3\no b\n\nf 3//1 1//1 2//1\nf 4//1 3//1 2//2\n"
+            ),
+            "vertex",
+            "line 16: the face has the vertex normal [0, 0, 0]",
+        ),
         ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n".to_owned(), "face", "at least one face"),
-        (format!("v nan 0 0\n{triangle}f 1 2 3\n"), "face", "vertex 1"),
+        (format!("{triangle}v nan 0 0\nf 1 2 3\nf 2 3 4\n"), "face", "line 6: the face has a corner at [NaN, 0, 0]"),
         (String::new(), "face", "at least one face"),
     ];
     for (text, normals, expected) in cases {

@@ -188,6 +188,27 @@ fn gltf_buffers_may_be_in_the_file_or_beside_it() {
 }
 
 #[test]
+fn a_face_beyond_the_vertices_is_named() {
+    let folder = tempfile::tempdir().expect("folder");
+    let (points, normals, _) = patch();
+    let (points, normals, faces) = (&points[..4], &normals[..4], [[0, 1, 2], [1, 2, 3], [1, 2, 9]]);
+    for (name, bytes, words) in [
+        ("a.ply", ply(points, normals, &faces, Encoding::Ascii), "face 3 names vertex 10, there are 4"),
+        ("b.ply", ply(points, normals, &faces, Encoding::Little), "face 3 names vertex 10, there are 4"),
+        ("a.glb", glb(points, normals, &faces, ""), "meshes[0].primitives[0]: triangle 3 names vertex 10, there are 4"),
+        ("a.obj", obj(points, normals, &faces), "line 11: face vertex index out of bounds"),
+    ] {
+        std::fs::write(folder.path().join(name), bytes).expect("written");
+        for shading in ["face", "vertex"] {
+            let mesh = format!("file = \"{name}\"\nnormals = \"{shading}\"");
+            let Err(error) = scene(folder.path(), &mesh) else { panic!("{name} is taken") };
+            let message = error.to_string();
+            assert!(message.contains(name) && message.ends_with(words), "{message}");
+        }
+    }
+}
+
+#[test]
 fn gltf_nodes_place_their_meshes_and_mirrors_keep_their_fronts() {
     let folder = tempfile::tempdir().expect("folder");
     let (points, normals, faces) = patch();
@@ -328,7 +349,12 @@ fn a_bad_mesh_file_says_what_is_wrong() {
     };
     std::fs::write(folder.path().join("short.bin"), [0; 7]).expect("written");
     for (name, text, normals, words) in [
-        ("a.ply", format!("{}{points}3 0 1 9\n", head("3", 1)), "face", "vertex 10, the file holds 3"),
+        (
+            "a.ply",
+            format!("{}{points}4 0 1 2 0\n3 0 1 9\n", head("3", 2)),
+            "face",
+            "face 2 names vertex 10, there are 3",
+        ),
         ("a.ply", format!("{}{points}3 0 1 -1\n", head("3", 1)), "face", "face 1 has no list"),
         ("a.ply", format!("{}{points}2 0 1\n", head("3", 1)), "face", "at least 3 vertices"),
         ("a.ply", format!("{}0 0 0\n1 zero 0\n", head("3", 1)), "face", "line 11"),

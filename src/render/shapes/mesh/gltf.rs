@@ -12,7 +12,7 @@ use gltf::{Document, Gltf, Node, Primitive};
 use super::{Mesh, Vertices, whole_file};
 use crate::render::RenderError;
 
-/// Nodes may be nested this deep; a file in which they go round in circles is deeper.
+/// Nodes may be nested this deep: a file in which they go round in circles is deeper.
 const DEEPEST: usize = 256;
 
 /// The mesh in a glTF file. Its buffers are in the file itself or in files beside it.
@@ -72,19 +72,27 @@ impl NodeReader {
         }
         let local = node.transform().matrix().map(|column| column.map(f64::from));
         let to_scene = parent * DMat4::from_cols_array_2d(&local);
-        for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-            match primitive.mode() {
-                Mode::Triangles => self.add_primitive(mesh, &primitive, &to_scene)?,
-                Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => {}
-                Mode::TriangleStrip | Mode::TriangleFan => {
-                    return Err("strips and fans of triangles are not read; save as separate triangles".into());
-                }
+        if let Some(shape) = node.mesh() {
+            for primitive in shape.primitives() {
+                let (m, p) = (shape.index(), primitive.index());
+                let placed = |what: String| format!("meshes[{m}].primitives[{p}]: {what}");
+                self.add_primitive(mesh, &primitive, &to_scene).map_err(placed)?;
             }
         }
         node.children().try_for_each(|child| self.add_node(mesh, &child, to_scene, depth + 1))
     }
 
     fn add_primitive(&self, mesh: &mut Mesh, primitive: &Primitive<'_>, to_scene: &DMat4) -> Result<(), String> {
+        match primitive.mode() {
+            Mode::Triangles => self.add_triangles(mesh, primitive, to_scene),
+            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => Ok(()),
+            Mode::TriangleStrip | Mode::TriangleFan => {
+                Err("strips and fans of triangles are not read; save as separate triangles".into())
+            }
+        }
+    }
+
+    fn add_triangles(&self, mesh: &mut Mesh, primitive: &Primitive<'_>, to_scene: &DMat4) -> Result<(), String> {
         let readable = |(_, accessor): (_, gltf::Accessor<'_>)| accessor.count() > 0 && accessor.sparse().is_none();
         let indices = primitive.indices().map(|accessor| (gltf::Semantic::Positions, accessor));
         if !primitive.attributes().chain(indices).all(readable) {
@@ -92,11 +100,11 @@ impl NodeReader {
         }
         let reader = primitive.reader(|buffer| self.buffers.get(buffer.index()).map(Vec::as_slice));
         let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
-        let positions = reader.read_positions().ok_or("a primitive has no positions within its buffer")?;
+        let positions = reader.read_positions().ok_or("there are no positions within the buffer")?;
         let mut vertices = Vertices::default();
         vertices.positions.extend(positions.map(|p| to_scene.transform_point3(vector(p))));
         if self.vertex_normals {
-            let normals = reader.read_normals().ok_or("vertex normals are asked for, but a primitive has none")?;
+            let normals = reader.read_normals().ok_or("vertex normals are asked for, but there are none")?;
             let turn = DMat3::from_mat4(*to_scene).inverse().transpose();
             vertices.normals.extend(normals.map(|n| turn * vector(n)));
         }
@@ -104,13 +112,14 @@ impl NodeReader {
         let indices: Vec<u32> = match (primitive.indices(), reader.read_indices()) {
             (None, _) => (0..vertices.positions.len() as u32).collect(),
             (Some(_), Some(indices)) => indices.into_u32().collect(),
-            (Some(_), None) => return Err("a primitive's indices lie outside of its buffer".into()),
+            (Some(_), None) => return Err("the indices lie outside of their buffer".into()),
         };
         // A mirrored node turns its faces round (glTF 2.0, section 3.7.4).
         let mirrored = to_scene.determinant() < 0.0;
-        for &[a, b, c] in indices.as_chunks::<3>().0 {
+        for (i, &[a, b, c]) in indices.as_chunks::<3>().0.iter().enumerate() {
             let corners = if mirrored { [a, c, b] } else { [a, b, c] };
-            vertices.add_face(mesh, corners, corners)?;
+            let of_triangle = |what: String| format!("triangle {} {what}", i + 1);
+            vertices.add_face(mesh, corners, corners).map_err(of_triangle)?;
         }
         Ok(())
     }

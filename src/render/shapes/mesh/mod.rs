@@ -23,7 +23,7 @@ pub struct Mesh {
 /// triangles without area are left out.
 ///
 /// # Errors
-/// [`RenderError`] naming the file and, where it is one, the line.
+/// [`RenderError`] naming the file and, where it is one, the line or the face (counted from 1).
 pub fn read_mesh(path: &Path, vertex_normals: bool) -> Result<Mesh, RenderError> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let read = match extension.as_str() {
@@ -55,19 +55,22 @@ struct Vertices {
 }
 
 impl Vertices {
-    /// The first position that is not finite is an error.
-    fn check(&self) -> Result<(), String> {
-        self.positions
-            .iter()
-            .position(|p| !p.is_finite())
-            .map_or(Ok(()), |i| Err(format!("vertex {} is {}, expected finite coordinates", i + 1, self.positions[i])))
+    /// The first position that is not finite, and its index.
+    fn not_finite(&self) -> Option<(usize, DVec3)> {
+        self.positions.iter().copied().enumerate().find(|(_, p)| !p.is_finite())
     }
 
-    /// Adds a triangle with these corners and, unless there are no normals, normals; one without area is left out.
+    /// The first position that is not finite is an error.
+    fn check(&self) -> Result<(), String> {
+        let wrong = |(i, p): (usize, DVec3)| Err(format!("vertex {} is {p}, expected finite coordinates", i + 1));
+        self.not_finite().map_or(Ok(()), wrong)
+    }
+
+    /// Adds a triangle with these corners and, unless there are no normals, normals; one without area is left out. An
+    /// error says what the face does, such as `names vertex 10, there are 3`.
     fn add_face(&self, mesh: &mut Mesh, corners: [u32; 3], normals: [u32; 3]) -> Result<(), String> {
         let at = |index: u32| {
-            let outside =
-                || format!("a face names vertex {}, the file holds {}", u64::from(index) + 1, self.positions.len());
+            let outside = || format!("names vertex {}, there are {}", u64::from(index) + 1, self.positions.len());
             self.positions.get(index as usize).copied().ok_or_else(outside)
         };
         let triangle = [at(corners[0])?, at(corners[1])?, at(corners[2])?];
@@ -82,9 +85,8 @@ impl Vertices {
     }
 
     fn normal(&self, index: u32) -> Result<DVec3, String> {
-        let outside =
-            || format!("a face names vertex normal {}, the file holds {}", u64::from(index) + 1, self.normals.len());
+        let outside = || format!("names vertex normal {}, there are {}", u64::from(index) + 1, self.normals.len());
         let given = self.normals.get(index as usize).copied().ok_or_else(outside)?;
-        given.try_normalize().ok_or_else(|| format!("vertex normal {} is {given}", u64::from(index) + 1))
+        given.try_normalize().ok_or_else(|| format!("has the vertex normal {given}"))
     }
 }

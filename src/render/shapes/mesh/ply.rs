@@ -55,7 +55,8 @@ fn assemble(points: &[Point], faces: &[Face], vertex_normals: bool) -> Result<Me
         }
         for k in 1..face.corners.len() - 1 {
             let corners = [face.corners[0], face.corners[k], face.corners[k + 1]];
-            vertices.add_face(&mut mesh, corners, corners)?;
+            let of_face = |what: String| format!("face {} {what}", i + 1);
+            vertices.add_face(&mut mesh, corners, corners).map_err(of_face)?;
         }
     }
     Ok(mesh)
