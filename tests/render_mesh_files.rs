@@ -185,6 +185,63 @@ fn gltf_buffers_may_be_in_the_file_or_beside_it() {
         |name: &str| radiance(&scene(folder.path(), &format!("file = \"{name}\"")).unwrap_or_else(|e| panic!("{e}")));
     let want = of("whole.glb");
     assert!(of("beside.gltf") == want && of("inside.gltf") == want);
+    // Escapes are undone; what is none, as a `%` that was not escaped itself, stands as it is.
+    std::fs::remove_file(folder.path().join("data.bin")).expect("removed");
+    for (uri, file) in [
+        ("my%20mesh.bin", "my mesh.bin"),
+        ("%C3%BCber%2dall.bin", "über-all.bin"),
+        ("100%25.bin", "100%.bin"),
+        ("50%.bin", "50%.bin"),
+        ("%+f%zz%2", "%+f%zz%2"),
+        ("%FF.bin", "%FF.bin"),
+        ("%ü1.bin", "%ü1.bin"),
+    ] {
+        let file = folder.path().join(file);
+        std::fs::write(&file, data).expect("written");
+        std::fs::write(folder.path().join("escaped.gltf"), with(uri.into())).expect("written");
+        assert!(of("escaped.gltf") == want, "{uri}");
+        std::fs::remove_file(file).expect("removed");
+    }
+}
+
+#[test]
+fn gltf_nodes_must_form_trees() {
+    let folder = tempfile::tempdir().expect("folder");
+    let data: Vec<u8> = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let data = base64::Engine::encode(&base64::prelude::BASE64_STANDARD, data);
+    let read = |roots: &str, nodes: &str| {
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[{roots}]}}],"nodes":[{nodes}],
+"buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{data}"}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],"bufferViews":[{{"buffer":0,"byteLength":36}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}]}}"#
+        );
+        std::fs::write(folder.path().join("a.gltf"), text).expect("written");
+        scene(folder.path(), "file = \"a.gltf\"").map(drop).map_err(|e| e.to_string())
+    };
+    let leaf = r#"{"mesh":0}"#;
+    let with = |children: &str| format!(r#"{{"children":[{children}]}}"#);
+    // Nodes may share a mesh.
+    let tree = format!("{},{leaf},{leaf},{leaf}", with("2,1"));
+    assert_eq!(read("0,3", &tree), Ok(()));
+    // Each node names the next twice: without an error the last would be there 2^20 times.
+    let doubling = (1..=20).map(|i| with(&format!("{i},{i}"))).collect::<Vec<_>>().join(",");
+    for (roots, nodes, node, parents) in [
+        ("0", format!("{},{},{},{leaf}", with("1,2"), with("3"), with("3")), 3, ["nodes[1]", "nodes[2]"]),
+        ("0", format!("{doubling},{leaf}"), 20, ["nodes[19]", "nodes[19]"]),
+        ("0,0", leaf.into(), 0, ["the scene", "the scene"]),
+        ("0,1", format!("{},{leaf}", with("1")), 1, ["nodes[0]", "the scene"]),
+        ("0", format!("{},{}", with("1"), with("0")), 0, ["the scene", "nodes[1]"]),
+        ("0", with("0"), 0, ["the scene", "nodes[0]"]),
+    ] {
+        let message = read(roots, &nodes).expect_err(&nodes);
+        let [first, second] = parents;
+        let want = format!("a.gltf: nodes[{node}] is named by {first} and by {second}, expected one parent at most");
+        assert!(message.ends_with(&want), "{nodes}: {message}");
+    }
+    let deep = (1..=257).map(|i| with(&i.to_string())).collect::<Vec<_>>().join(",");
+    let message = read("0", &format!("{deep},{leaf}")).expect_err("too deep");
+    assert!(message.ends_with("nodes are nested more than 256 deep"), "{message}");
 }
 
 #[test]

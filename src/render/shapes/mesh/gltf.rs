@@ -1,5 +1,6 @@
 //! glTF 2.0 files, `.gltf` and `.glb` (crate `gltf`): the triangles of the default scene's nodes, in place.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use base64::Engine;
@@ -12,18 +13,18 @@ use gltf::{Document, Gltf, Node, Primitive};
 use super::{Mesh, Vertices, whole_file};
 use crate::render::RenderError;
 
-/// Nodes may be nested this deep: a file in which they go round in circles is deeper.
+/// Nodes may be nested this deep: each takes room on the stack.
 const DEEPEST: usize = 256;
 
 /// The mesh in a glTF file. Its buffers are in the file itself or in files beside it.
 pub fn read(path: &Path, bytes: &[u8], vertex_normals: bool) -> Result<Mesh, RenderError> {
     let gltf = Gltf::from_slice(bytes).map_err(|error| whole_file(path, error.to_string()))?;
     let buffers = buffers(path, &gltf)?;
-    let reader = NodeReader { buffers, vertex_normals };
+    let mut reader = NodeReader { buffers, vertex_normals, parents: HashMap::new() };
     let mut mesh = Mesh::default();
     let wrong = |message: String| whole_file(path, message);
     for node in roots(&gltf.document) {
-        reader.add_node(&mut mesh, &node, DMat4::IDENTITY, 0).map_err(wrong)?;
+        reader.add_node(&mut mesh, &node, None, DMat4::IDENTITY, 0).map_err(wrong)?;
     }
     Ok(mesh)
 }
@@ -46,7 +47,7 @@ fn buffers(path: &Path, gltf: &Gltf) -> Result<Vec<Vec<u8>>, RenderError> {
                 bytes.ok_or_else(|| whole_file(path, broken()))?
             }
             Source::Uri(uri) => {
-                let file = folder.join(uri);
+                let file = folder.join(percent_decoded(uri));
                 std::fs::read(&file).map_err(|source| RenderError::Io { path: file, source })?
             }
         };
@@ -60,18 +61,56 @@ fn buffers(path: &Path, gltf: &Gltf) -> Result<Vec<Vec<u8>>, RenderError> {
     gltf.document.buffers().map(read).collect()
 }
 
+/// A URI without its escapes `%xx` (RFC 3986, section 2.1). A `%` that no two hexadecimal digits follow stands for itself,
+/// as in files that were written without escapes, and so does everything where the outcome is not UTF-8.
+fn percent_decoded(uri: &str) -> String {
+    let mut pieces = uri.split('%');
+    let mut decoded = pieces.next().unwrap_or_default().as_bytes().to_vec();
+    for piece in pieces {
+        let (byte, rest) = escaped(piece).unwrap_or((b'%', piece));
+        decoded.push(byte);
+        decoded.extend(rest.as_bytes());
+    }
+    String::from_utf8(decoded).unwrap_or_else(|_| uri.into())
+}
+
+/// The byte that the first two characters are the digits of, and what follows them.
+fn escaped(piece: &str) -> Option<(u8, &str)> {
+    let (digits, rest) = piece.split_at_checked(2)?;
+    let hexadecimal = digits.bytes().all(|b| b.is_ascii_hexdigit()); // the parser takes a sign, too
+    u8::from_str_radix(digits, 16).ok().filter(|_| hexadecimal).map(|byte| (byte, rest))
+}
+
 struct NodeReader {
     buffers: Vec<Vec<u8>>,
     vertex_normals: bool,
+    /// What named each node that has been entered, by index: a node, or the scene.
+    parents: HashMap<usize, Option<usize>>,
 }
 
 impl NodeReader {
-    fn add_node(&self, mesh: &mut Mesh, node: &Node<'_>, parent: DMat4, depth: usize) -> Result<(), String> {
+    /// Refuses a node that was entered before: nodes form strict trees (glTF 2.0, section 3.5.2). Otherwise copies of
+    /// copies would double with every level.
+    fn enter(&mut self, node: &Node<'_>, parent: Option<usize>) -> Result<(), String> {
+        let Some(first) = self.parents.insert(node.index(), parent) else { return Ok(()) };
+        let [first, second] = [first, parent].map(|p| p.map_or("the scene".into(), |i| format!("nodes[{i}]")));
+        Err(format!("nodes[{}] is named by {first} and by {second}, expected one parent at most", node.index()))
+    }
+
+    fn add_node(
+        &mut self,
+        mesh: &mut Mesh,
+        node: &Node<'_>,
+        parent: Option<usize>,
+        parent_to_scene: DMat4,
+        depth: usize,
+    ) -> Result<(), String> {
+        self.enter(node, parent)?;
         if depth > DEEPEST {
             return Err(format!("nodes are nested more than {DEEPEST} deep"));
         }
         let local = node.transform().matrix().map(|column| column.map(f64::from));
-        let to_scene = parent * DMat4::from_cols_array_2d(&local);
+        let to_scene = parent_to_scene * DMat4::from_cols_array_2d(&local);
         if let Some(shape) = node.mesh() {
             for primitive in shape.primitives() {
                 let (m, p) = (shape.index(), primitive.index());
@@ -79,7 +118,8 @@ impl NodeReader {
                 self.add_primitive(mesh, &primitive, &to_scene).map_err(placed)?;
             }
         }
-        node.children().try_for_each(|child| self.add_node(mesh, &child, to_scene, depth + 1))
+        let this = Some(node.index());
+        node.children().try_for_each(|child| self.add_node(mesh, &child, this, to_scene, depth + 1))
     }
 
     fn add_primitive(&self, mesh: &mut Mesh, primitive: &Primitive<'_>, to_scene: &DMat4) -> Result<(), String> {
