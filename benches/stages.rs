@@ -15,7 +15,7 @@ use goniofit::gonio::{Instrument, Preset, Scan};
 use goniofit::image::{compare, read_exr};
 use goniofit::measurement::interpolate::TableBrdf;
 use goniofit::measurement::{Format, Measurement, ReadOptions, formats};
-use goniofit::render::Options;
+use goniofit::render::{Materials, Options, Scene, SceneSpec};
 use goniofit::report::page;
 use goniofit::report::run::{Run, RunOptions};
 
@@ -139,5 +139,89 @@ fn results(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(stages, files, fits, instrument, faults, tables, pictures, results);
+/// A wavy sheet of 2 · `SHEET`² triangles.
+const SHEET: u32 = 500;
+
+fn sheet() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let side = SHEET + 1;
+    let at = |k: u32| {
+        let (x, y) = ((k % side) as f32 / SHEET as f32, (k / side) as f32 / SHEET as f32);
+        [x, 0.1 * (20.0 * x).sin() * (30.0 * y).cos(), y]
+    };
+    let cell = |k: u32| {
+        let a = k / SHEET * side + k % SHEET;
+        [[a, a + side, a + 1], [a + 1, a + side, a + side + 1]]
+    };
+    ((0..side * side).map(at).collect(), (0..SHEET * SHEET).flat_map(cell).collect())
+}
+
+fn ply(points: &[[f32; 3]], faces: &[[u32; 3]]) -> Vec<u8> {
+    let mut file = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        points.len(),
+        faces.len()
+    )
+    .into_bytes();
+    file.extend(points.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for face in faces {
+        file.push(3);
+        file.extend(face.iter().flat_map(|i| i.to_le_bytes()));
+    }
+    file
+}
+
+fn obj(points: &[[f32; 3]], faces: &[[u32; 3]]) -> Vec<u8> {
+    let vertices = points.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+    let faces = faces.iter().map(|f| format!("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1));
+    vertices.chain(faces).collect::<String>().into_bytes()
+}
+
+fn glb(points: &[[f32; 3]], faces: &[[u32; 3]]) -> Vec<u8> {
+    let data: Vec<u8> = points
+        .iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .chain(faces.iter().flatten().flat_map(|i| i.to_le_bytes()))
+        .collect();
+    let (first, all) = (12 * points.len(), data.len());
+    let mut json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"buffers":[{{"byteLength":{all}}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{first}}},{{"buffer":0,"byteOffset":{first},"byteLength":{}}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":{},"type":"VEC3","min":[0,-0.1,0],"max":[1,0.1,1]}},
+        {{"bufferView":1,"componentType":5125,"count":{},"type":"SCALAR"}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}]}}"#,
+        all - first,
+        points.len(),
+        3 * faces.len()
+    )
+    .into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let chunk = |kind: &[u8; 4], bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes()[..], kind, bytes].concat();
+    let chunks = [chunk(b"JSON", &json), chunk(b"BIN\0", &data)].concat();
+    let total = 12 + chunks.len() as u32;
+    [b"glTF", &2u32.to_le_bytes()[..], &total.to_le_bytes(), &chunks].concat()
+}
+
+fn meshes(c: &mut Criterion) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (points, faces) = sheet();
+    let mut group = c.benchmark_group("meshes");
+    group.sample_size(10);
+    for (name, bytes) in [("ply", ply(&points, &faces)), ("obj", obj(&points, &faces)), ("glb", glb(&points, &faces))] {
+        std::fs::write(folder.path().join(format!("sheet.{name}")), bytes).expect("writes");
+        let scene = format!(
+            "version = 1\nname = \"sheet\"\n[camera]\nposition = [0, 2, 3]\ntarget = [0, 0, 0]\nfov_deg = 40\n\
+             [materials]\nm = {{ kd = [0.5, 0.5, 0.5] }}\n[[mesh]]\nfile = \"sheet.{name}\"\nmaterial = \"m\"\n\
+             [[light.point]]\nposition = [0, 3, 0]\nintensity = [1, 1, 1]\n"
+        );
+        let spec = SceneSpec::parse(&scene, "sheet").expect("a scene");
+        group.bench_function(format!("read a .{name} of 500,000 triangles (warm), build its hierarchy"), |b| {
+            b.iter(|| Scene::build(black_box(&spec), folder.path(), &Materials::new()).expect("builds"));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(stages, files, fits, instrument, faults, tables, meshes, pictures, results);
 criterion_main!(stages);

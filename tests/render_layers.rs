@@ -10,13 +10,17 @@ use goniofit::image::{Image, LayerKind, compare};
 use goniofit::render::scene::builtin;
 use goniofit::render::{LayerSet, Materials, Options, Scene, SceneSpec, render};
 
-const ALL: [LayerKind; 6] = [
+const ALL: [LayerKind; 10] = [
     LayerKind::Albedo,
     LayerKind::Normal,
     LayerKind::Depth,
     LayerKind::Samples,
     LayerKind::Direct,
     LayerKind::Indirect,
+    LayerKind::Diffuse,
+    LayerKind::Glossy1,
+    LayerKind::Glossy2,
+    LayerKind::Glossy3,
 ];
 
 fn built(spec: &SceneSpec) -> Scene {
@@ -41,13 +45,13 @@ fn at(image: &Image, kind: LayerKind, i: usize) -> Vec<f64> {
 fn layers_change_no_more_than_the_noise_of_the_picture() {
     let scene = built(&builtin("mesh-env").expect("built in"));
     let (without, with) = (shot(&scene, 20, &[]), shot(&scene, 20, &ALL));
-    assert!(without.layers.is_empty() && with.layers.len() == 6);
+    assert!(without.layers.is_empty() && with.layers.len() == ALL.len());
     assert!(without.radiance == with.radiance && without.standard_error == with.standard_error);
     for name in ["sphere", "sphere-on-plane", "cornell", "furnace"] {
         let scene = built(&builtin(name).expect("built in"));
         let (without, with) = (shot(&scene, 64, &[]), shot(&scene, 64, &ALL));
         let found = compare(&without, &with).expect("one size").significance.expect("samples enough");
-        assert!(!found.differs && with.layers.len() == 6, "{name}: {found:?}");
+        assert!(!found.differs && with.layers.len() == ALL.len(), "{name}: {found:?}");
     }
 }
 
@@ -116,4 +120,48 @@ fn a_light_and_phong_s_equation_have_no_albedo_but_a_depth() {
     assert_eq!(at(&image, LayerKind::Albedo, 300), [0.0; 3]);
     assert!((2.0..2.2).contains(&at(&image, LayerKind::Depth, 300)[0]));
     assert!((at(&image, LayerKind::Direct, 300)[0] - image.radiance[300][0]).abs() < 1e-12);
+}
+
+const LOBES: [LayerKind; 4] = [LayerKind::Diffuse, LayerKind::Glossy1, LayerKind::Glossy2, LayerKind::Glossy3];
+
+/// A ball above a floor, of one material, that fill the picture, under a lamp that is not in it and a point; weights of the Lambert lobe and of two Phong lobes.
+fn of_lobes(weights: [f64; 3], bounces: u32) -> Scene {
+    let [kd, sharp, broad] = weights;
+    scene(&format!(
+        "version = 1\nname = \"lobes\"\nmax_bounces = {bounces}\n[camera]\nposition = [0, 4, 1]\ntarget = [0, 0, 0]\nfov_deg = 30\n\
+         [materials]\nm = {{ kd = [{kd}, {kd}, {}], phong = [{{ ks = [{sharp}, {sharp}, {sharp}], n = 300 }}, {{ ks = [{broad}, 0, {broad}], n = 8 }}] }}\n\
+         [[sphere]]\ncenter = [0, 0.5, 0]\nradius = 0.5\nmaterial = \"m\"\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"m\"\n\
+         [[light.quad]]\ncenter = [2, 5, -1]\nu = [1, 0, 0]\nv = [0, 0, 1]\nradiance = [6, 6, 6]\n\
+         [[light.point]]\nposition = [-2, 6, 1]\nintensity = [9, 5, 9]\n",
+        0.5 * kd
+    ))
+}
+
+#[test]
+fn lobes_add_up_to_the_radiance() {
+    let image = shot(&of_lobes([0.3, 0.2, 0.4], 4), 16, &LOBES);
+    for i in 0..image.radiance.len() {
+        let sum = LOBES.iter().map(|kind| DVec3::from_slice(&at(&image, *kind, i))).sum::<DVec3>();
+        let want = DVec3::from(image.radiance[i]);
+        assert!((sum - want).abs().max_element() <= 1e-12 * want.max_element(), "pixel {i}: {sum} vs {want}");
+        assert_eq!(at(&image, LayerKind::Glossy3, i), [0.0; 3], "there are two Phong lobes");
+        assert_eq!(at(&image, LayerKind::Glossy2, i)[1], 0.0, "it is not green");
+    }
+}
+
+/// After one scattering event each lobe's layer is the picture of a material that has it alone.
+#[test]
+fn a_lobe_s_layer_is_what_it_would_show_alone() {
+    let weights = [0.3, 0.2, 0.4];
+    let image = shot(&of_lobes(weights, 1), 256, &LOBES);
+    let n = image.radiance.len();
+    for (k, kind) in LOBES[..3].iter().enumerate() {
+        let alone = std::array::from_fn(|j| if j == k { weights[j] } else { 0.0 });
+        let options = Options { width: 24, height: 24, samples: 256, seed: 6, ..Options::default() };
+        let (want, noise) = mean(&render(&of_lobes(alone, 1), &options, Control::silent()).expect("renders"));
+        let got = (0..n).map(|i| DVec3::from_slice(&at(&image, *kind, i))).sum::<DVec3>() / n as f64;
+        let z = excess(got, want, noise * std::f64::consts::SQRT_2);
+        println!("{kind:?}: {got} vs {want} ± {noise}");
+        assert!(want.max_element() > 0.01 && z < 5.0, "{kind:?}: {got} vs {want}: {z} sigma");
+    }
 }

@@ -141,12 +141,15 @@ impl Material {
     pub fn reflectance(&self, channels: &[usize]) -> Option<Reflectance> {
         let pick = |list: &[f64]| channels.iter().map(|&c| list.get(c).copied()).collect::<Option<Vec<f64>>>();
         let mut diffuse = vec![0.0; channels.len()];
-        let mut glossy = Vec::new();
+        let (mut glossy, mut count) = (Vec::new(), 0);
         for term in &self.lobes {
             let weight = pick(&term.weight)?;
             match term.kind {
                 LobeKind::Lambert => diffuse.iter_mut().zip(&weight).for_each(|(d, w)| *d += w),
-                LobeKind::Phong => glossy.extend(glossy_terms(term, channels, weight)?),
+                LobeKind::Phong => {
+                    glossy.extend(glossy_terms(term, channels, weight, count)?);
+                    count += 1;
+                }
                 LobeKind::Lambert2d | LobeKind::Phong2d => return None,
             }
         }
@@ -154,24 +157,23 @@ impl Material {
     }
 }
 
-/// One Phong term for a shared exponent, or one a channel; none where the weights are all 0.
-fn glossy_terms(term: &LobeTerm, channels: &[usize], weight: Vec<f64>) -> Option<Vec<GlossyTerm>> {
+/// One Phong term for a shared exponent, or one a channel, of a material's Phong lobe with this number.
+fn glossy_terms(term: &LobeTerm, channels: &[usize], weight: Vec<f64>, lobe: usize) -> Option<Vec<GlossyTerm>> {
     let exponent = match term.shape.as_deref() {
         None | Some([]) => return Some(Vec::new()),
         Some([exponent, ..]) => exponent,
     };
     let mut terms = Vec::new();
     match exponent {
-        PerChannel::Shared(n) => terms.push(GlossyTerm { weight, exponent: *n }),
+        PerChannel::Shared(n) => terms.push(GlossyTerm { weight, exponent: *n, lobe }),
         PerChannel::Each(list) => {
             for (slot, (&c, &w)) in channels.iter().zip(&weight).enumerate() {
                 let mut single = vec![0.0; channels.len()];
                 single[slot] = w;
-                terms.push(GlossyTerm { weight: single, exponent: *list.get(c)? });
+                terms.push(GlossyTerm { weight: single, exponent: *list.get(c)?, lobe });
             }
         }
     }
-    terms.retain(|t| t.weight.iter().any(|w| *w != 0.0));
     Some(terms)
 }
 
@@ -179,6 +181,8 @@ fn glossy_terms(term: &LobeTerm, channels: &[usize], weight: Vec<f64>) -> Option
 struct GlossyTerm {
     weight: Vec<f64>,
     exponent: f64,
+    /// Which of the material's Phong lobes it is, or a channel of.
+    lobe: usize,
 }
 
 /// A sum of Lambert and Phong lobes, ready to be evaluated and sampled: each lobe is drawn in proportion to what it reflects, about.
@@ -191,7 +195,9 @@ pub struct Reflectance {
 }
 
 impl Reflectance {
-    fn new(diffuse: Vec<f64>, glossy: Vec<GlossyTerm>) -> Self {
+    /// Without terms of which all weights are 0.
+    fn new(diffuse: Vec<f64>, mut glossy: Vec<GlossyTerm>) -> Self {
+        glossy.retain(|term| term.weight.iter().any(|w| *w != 0.0));
         let mean = |w: &[f64]| w.iter().map(|x| x.abs()).sum::<f64>() / w.len().max(1) as f64;
         let mut share: Vec<f64> =
             std::iter::once(mean(&diffuse)).chain(glossy.iter().map(|g| mean(&g.weight))).collect();
@@ -213,7 +219,8 @@ impl Reflectance {
     /// A Lambert lobe and any number of Phong lobes (weights, exponent ≥ 0), one weight a channel.
     #[must_use]
     pub fn lobes(diffuse: Vec<f64>, phong: impl IntoIterator<Item = (Vec<f64>, f64)>) -> Self {
-        Self::new(diffuse, phong.into_iter().map(|(weight, exponent)| GlossyTerm { weight, exponent }).collect())
+        let term = |(lobe, (weight, exponent))| GlossyTerm { weight, exponent, lobe };
+        Self::new(diffuse, phong.into_iter().enumerate().map(term).collect())
     }
 
     /// Probability of drawing from the diffuse lobe for an eye at cosθo = `cos`, and by what the shares of glossy ones are to be multiplied, before
@@ -230,6 +237,26 @@ impl Reflectance {
     pub fn parts(&self) -> (&[f64], f64, impl Iterator<Item = (&[f64], f64, f64)>) {
         let glossy = self.glossy.iter().zip(&self.share[1..]);
         (&self.diffuse, self.share[0], glossy.map(|(term, share)| (&term.weight[..], term.exponent, *share)))
+    }
+
+    /// Whether it reflects nothing.
+    #[must_use]
+    pub fn is_black(&self) -> bool {
+        self.glossy.is_empty() && self.diffuse.iter().all(|w| *w == 0.0)
+    }
+
+    /// Calls `add` with what lobes contribute to the BRDF, 1/sr: 0 for the Lambert lobe and k for the k-th Phong lobe of the material, weights, and the value of a
+    /// lobe of weight 1.
+    pub fn split(&self, wi: DVec3, wo: DVec3, mut add: impl FnMut(usize, &[f64], f64)) {
+        let base = super::lambert::Lambert.value(&[], super::lambert::Lambert.coordinate(wi, wo), &mut []);
+        add(0, &self.diffuse, base);
+        if base == 0.0 || self.glossy.is_empty() {
+            return;
+        }
+        let coordinate = ln_cos_alpha(wi, wo);
+        for term in &self.glossy {
+            add(1 + term.lobe, &term.weight, phong::Phong.value(&[term.exponent], coordinate, &mut [0.0]));
+        }
     }
 
     /// Directional albedo of each channel for light to or from `w`.
@@ -255,16 +282,8 @@ impl Brdf for Reflectance {
     }
 
     fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool {
-        let base = super::lambert::Lambert.value(&[], super::lambert::Lambert.coordinate(wi, wo), &mut []);
-        out.iter_mut().zip(&self.diffuse).for_each(|(o, d)| *o = d * base);
-        if base == 0.0 || self.glossy.is_empty() {
-            return true;
-        }
-        let coordinate = ln_cos_alpha(wi, wo);
-        for term in &self.glossy {
-            let lobe = phong::Phong.value(&[term.exponent], coordinate, &mut [0.0]);
-            out.iter_mut().zip(&term.weight).for_each(|(o, w)| *o += w * lobe);
-        }
+        out.fill(0.0);
+        self.split(wi, wo, |_, weight, lobe| out.iter_mut().zip(weight).for_each(|(o, w)| *o += w * lobe));
         true
     }
 

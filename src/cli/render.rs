@@ -38,7 +38,7 @@ pub(super) struct Args {
     /// Also write a preview: exposed, clipped, sRGB
     #[arg(long, value_name = "IMG.png")]
     png: Option<PathBuf>,
-    /// Exposure of the preview, stops (default: the brightest 1 % clips)
+    /// Exposure of the preview, stops (default: the brightest 1 % clips, lamps left aside)
     #[arg(long, allow_negative_numbers = true, requires = "png", value_parser = parse_exposure)]
     exposure: Option<f64>,
     /// Relative error that the picture may have, 1% say: renders until it is met with 95 % confidence, most where it is noisy

@@ -207,6 +207,10 @@ impl Bar {
 }
 
 impl Progress for Bar {
+    fn is_seen(&self) -> bool {
+        !self.quiet
+    }
+
     fn start(&self, label: &str, total: u64) {
         if self.quiet {
             return;

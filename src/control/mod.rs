@@ -19,6 +19,10 @@ pub trait Progress: Sync {
     fn advance(&self, steps: u64);
     /// How good the current stage's result is by now, in a few words.
     fn tell(&self, _state: &str) {}
+    /// Whether anybody sees it: what is told takes work to find out.
+    fn is_seen(&self) -> bool {
+        true
+    }
     /// The current stage is over.
     fn finish(&self);
 }
@@ -28,6 +32,9 @@ pub trait Progress: Sync {
 pub struct Quiet;
 
 impl Progress for Quiet {
+    fn is_seen(&self) -> bool {
+        false
+    }
     fn start(&self, _label: &str, _total: u64) {}
     fn advance(&self, _steps: u64) {}
     fn finish(&self) {}

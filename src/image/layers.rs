@@ -19,6 +19,15 @@ pub enum LayerKind {
     Direct,
     /// Radiance of the light that reaches the eye after two scattering events or more: radiance less [`LayerKind::Direct`].
     Indirect,
+    /// Radiance that the Lambert lobe of the surface that is seen first reflects to the eye, direct and indirect light, W/(sr·m²). What has no lobes
+    /// (a table, Phong's equation, a light, nothing) adds 0 here and to the next three.
+    Diffuse,
+    /// The same of its first Phong lobe.
+    Glossy1,
+    /// The same of its second Phong lobe.
+    Glossy2,
+    /// The same of its third Phong lobe.
+    Glossy3,
     /// Of two pictures: (x − ref)/√(ref² + 0.01), whose mean square is relMSE.
     Relative,
     /// Of two pictures: LDR-ꟻLIP, 0 to 1.
@@ -27,13 +36,17 @@ pub enum LayerKind {
 
 impl LayerKind {
     /// All kinds, in the order in which files hold them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 12] = [
         Self::Albedo,
         Self::Normal,
         Self::Depth,
         Self::Samples,
         Self::Direct,
         Self::Indirect,
+        Self::Diffuse,
+        Self::Glossy1,
+        Self::Glossy2,
+        Self::Glossy3,
         Self::Relative,
         Self::Flip,
     ];
@@ -48,6 +61,10 @@ impl LayerKind {
             Self::Samples => &["samples"],
             Self::Direct => &["direct.R", "direct.G", "direct.B"],
             Self::Indirect => &["indirect.R", "indirect.G", "indirect.B"],
+            Self::Diffuse => &["diffuse.R", "diffuse.G", "diffuse.B"],
+            Self::Glossy1 => &["glossy1.R", "glossy1.G", "glossy1.B"],
+            Self::Glossy2 => &["glossy2.R", "glossy2.G", "glossy2.B"],
+            Self::Glossy3 => &["glossy3.R", "glossy3.G", "glossy3.B"],
             Self::Relative => &["relative.R", "relative.G", "relative.B"],
             Self::Flip => &["flip"],
         }

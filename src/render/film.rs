@@ -1,6 +1,6 @@
 //! The film: passes over the picture, and what every pixel has gathered.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -23,7 +23,10 @@ use crate::image::{Image, Metadata};
 /// Samples that a tile's pixels get between two looks at the clock and the wish to stop.
 const PASS: u32 = 32;
 
-/// Pixels of a picture at most, which take about 12 GB, and with all of [`LayerSet::NAMED`] about 2.5 times that.
+/// How often the error so far is told, at most, where no target asks for it: it takes a pass over the picture.
+const TOLD_EVERY: Duration = Duration::from_secs(1);
+
+/// Pixels of a picture at most, which take about 12 GB, and with all of [`LayerSet::NAMED`] about 3.4 times that.
 pub const MAX_PIXELS: u64 = crate::image::MAX_PIXELS;
 
 /// What to render.
@@ -190,7 +193,7 @@ impl Film {
         let errors = |i: usize| standard_errors(self.tiles.tile(i), self.tile_pixels(i));
         let errors: Vec<DVec3> = (0..self.tiles.count()).into_par_iter().flat_map_iter(errors).collect();
         let slots = || self.tiles.slots();
-        let gathered: Vec<Gathered> = slots().filter_map(|slot| self.gathered.get(slot).copied()).collect();
+        let gathered: Vec<&Gathered> = slots().filter_map(|slot| self.gathered.get(slot)).collect();
         Image {
             width: self.width as usize,
             height: self.height as usize,
@@ -276,7 +279,7 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         control.progress.start("render", u64::from(options.samples) * tiles.count() as u64);
     }
     let mut more = Some(schedule.first(if painter.packets.is_some() { 8 } else { 1 }));
-    let mut state = String::new();
+    let (mut state, mut told) = (String::new(), start);
     while let Some(round) = more.take() {
         if schedule.adapts() {
             control.progress.start("render, next round", round.iter().map(|n| u64::from(*n)).sum());
@@ -288,9 +291,12 @@ pub fn render(scene: &Scene, options: &Options, control: Control<'_>) -> Result<
         schedule.advance(&round);
         let over = control.stop.requested() || schedule.deadline().is_some_and(|end| Instant::now() >= end);
         if !over {
-            let noise = if schedule.adapts() { film.noise() } else { Vec::new() };
-            if schedule.adapts() {
+            let is_time = control.progress.is_seen() && told.elapsed() >= TOLD_EVERY && film.samples() >= 2;
+            let noise = if schedule.adapts() || is_time { film.noise() } else { Vec::new() };
+            if !noise.is_empty() {
+                told = Instant::now();
                 state = format!("error {:.2} %", 100.0 * Noise::all(&noise).relative());
+                control.progress.tell(&state);
             }
             more = schedule.next(&noise);
             film.doubt = schedule.doubt();

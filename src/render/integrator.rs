@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::lights::Arrival;
 use super::material::{Material, PhongEquation, eval_rgb};
 use super::plan::Plan;
 use super::points::{Decision, Draws};
@@ -61,11 +62,17 @@ pub trait Watch {
     fn first_surface(&mut self, eye: DVec3, surface: &Surface, material: Option<&Material>, draws: Draws);
     /// From here on light has scattered twice or more; `so_far` is the radiance of the light that has not.
     fn indirect_begins(&mut self, so_far: DVec3);
+    /// The first surface reflected this radiance of light that was aimed at, for local directions to the light and to the eye.
+    fn first_reflects(&mut self, brdf: &dyn Brdf, directions: (DVec3, DVec3), radiance: DVec3);
+    /// The path goes on from the first surface, for local directions onward and to the eye; `so_far` is its radiance until then.
+    fn first_goes_on(&mut self, brdf: &dyn Brdf, directions: (DVec3, DVec3), so_far: DVec3);
 }
 
 impl Watch for () {
     fn first_surface(&mut self, _: DVec3, _: &Surface, _: Option<&Material>, _: Draws) {}
     fn indirect_begins(&mut self, _: DVec3) {}
+    fn first_reflects(&mut self, _: &dyn Brdf, _: (DVec3, DVec3), _: DVec3) {}
+    fn first_goes_on(&mut self, _: &dyn Brdf, _: (DVec3, DVec3), _: DVec3) {}
 }
 
 /// Where and how the path scattered last.
@@ -154,7 +161,7 @@ impl<'a> Tracer<'a> {
                 // What the lights send to the second surface will have scattered there and at the first.
                 watch.indirect_begins(path.radiance);
             }
-            let Some(next) = self.scatter(material, &vertex, bounce, &mut path, draws) else { break };
+            let Some(next) = self.scatter(material, &vertex, bounce, &mut path, (draws, watch)) else { break };
             ray = Ray::new(vertex.point.above(), next.0);
             last = Some(next.1);
         }
@@ -186,7 +193,7 @@ impl<'a> Tracer<'a> {
         vertex: &Vertex,
         bounce: u32,
         path: &mut Path,
-        draws: Draws,
+        (draws, watch): (Draws, &mut impl Watch),
     ) -> Option<(DVec3, Scatter)> {
         let brdf = match material {
             Material::Black => return None,
@@ -197,7 +204,7 @@ impl<'a> Tracer<'a> {
             }
             Material::Brdf(brdf) => brdf.as_ref(),
         };
-        self.add_direct(brdf, vertex, bounce, path, draws);
+        self.add_direct(brdf, vertex, bounce, path, (draws, watch));
         if bounce + 1 == self.events && !self.plan.chance {
             return None;
         }
@@ -207,6 +214,9 @@ impl<'a> Tracer<'a> {
             path.meet_unknown();
         }
         path.throughput *= f * (drawn.wi.z / drawn.pdf);
+        if bounce == 0 {
+            watch.first_goes_on(brdf, (drawn.wi, vertex.wo), path.radiance);
+        }
         let direction = vertex.frame.to_world(drawn.wi).normalize();
         let above = vertex.point.normal.dot(direction) > 0.0;
         let goes_on = above
@@ -217,7 +227,22 @@ impl<'a> Tracer<'a> {
     }
 
     /// Light found by aiming at the lights.
-    fn add_direct(&self, brdf: &dyn Brdf, vertex: &Vertex, bounce: u32, path: &mut Path, draws: Draws) {
+    fn add_direct(
+        &self,
+        brdf: &dyn Brdf,
+        vertex: &Vertex,
+        bounce: u32,
+        path: &mut Path,
+        (draws, watch): (Draws, &mut impl Watch),
+    ) {
+        let mut add = |aim: Arrival| {
+            let before = path.radiance;
+            self.add_unhidden(brdf, vertex, &aim, path);
+            if bounce == 0 {
+                let wi = vertex.frame.to_local(aim.wi);
+                watch.first_reflects(brdf, (wi, vertex.wo), path.radiance - before);
+            }
+        };
         for (k, light) in self.scene.lights.iter().enumerate() {
             let by_chance = light.has_surface();
             if by_chance && self.strategy == Strategy::MaterialOnly {
@@ -226,8 +251,7 @@ impl<'a> Tracer<'a> {
             let draw = || self.draws_at(draws, bounce, Decision::Light(k as u32)).pair();
             let u = if by_chance { draw() } else { DVec2::ZERO };
             let Some(arrival) = light.sample(&vertex.point, u) else { continue };
-            let reflected = self.reflected(brdf, vertex, arrival.wi, arrival.pdf);
-            self.add_unhidden(reflected, &arrival.shadow, arrival.irradiance, path);
+            add(arrival);
         }
         if let Some(environment) = &self.scene.environment
             && self.strategy != Strategy::MaterialOnly
@@ -236,20 +260,21 @@ impl<'a> Tracer<'a> {
             let Some(sky) = environment.sample(&vertex.frame, u) else { return };
             let irradiance = sky.radiance / sky.pdf;
             if irradiance.is_finite() {
-                let reflected = self.reflected(brdf, vertex, sky.wi, Some(sky.pdf));
-                self.add_unhidden(reflected, &Ray::new(vertex.point.above(), sky.wi), irradiance, path);
+                let shadow = Ray::new(vertex.point.above(), sky.wi);
+                add(Arrival { wi: sky.wi, irradiance, pdf: Some(sky.pdf), shadow });
             }
         }
     }
 
-    /// Adds what is reflected of the irradiance that arrives along `shadow`, where nothing is in its way.
-    fn add_unhidden(&self, reflected: Option<DVec3>, shadow: &Ray, irradiance: DVec3, path: &mut Path) {
-        let matters = irradiance != DVec3::ZERO && reflected != Some(DVec3::ZERO);
-        if !matters || self.hides(shadow, path) {
+    /// Adds what is reflected of the irradiance that arrives from where the path aimed, where nothing is in its way.
+    fn add_unhidden(&self, brdf: &dyn Brdf, vertex: &Vertex, aim: &Arrival, path: &mut Path) {
+        let reflected = self.reflected(brdf, vertex, aim.wi, aim.pdf);
+        let matters = aim.irradiance != DVec3::ZERO && reflected != Some(DVec3::ZERO);
+        if !matters || self.hides(&aim.shadow, path) {
             return;
         }
         match reflected {
-            Some(reflected) => path.radiance += path.throughput * reflected * irradiance,
+            Some(reflected) => path.radiance += path.throughput * reflected * aim.irradiance,
             None => path.meet_unknown(),
         }
     }

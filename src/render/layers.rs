@@ -7,28 +7,33 @@ use super::integrator::Watch;
 use super::material::{Material, eval_rgb};
 use super::points::Draws;
 use super::shapes::Surface;
+use crate::brdf::Brdf;
 use crate::geometry::Frame;
 use crate::image::{Layer, LayerKind};
 
 /// Which layers a render gathers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LayerSet(u8);
+pub struct LayerSet(u16);
 
 impl LayerSet {
     /// Kinds that a render can have, with the names that the command line gives them.
-    pub const NAMED: [(&'static str, LayerKind); 6] = [
+    pub const NAMED: [(&'static str, LayerKind); 10] = [
         ("albedo", LayerKind::Albedo),
         ("normal", LayerKind::Normal),
         ("depth", LayerKind::Depth),
         ("samples", LayerKind::Samples),
         ("direct", LayerKind::Direct),
         ("indirect", LayerKind::Indirect),
+        ("diffuse", LayerKind::Diffuse),
+        ("glossy1", LayerKind::Glossy1),
+        ("glossy2", LayerKind::Glossy2),
+        ("glossy3", LayerKind::Glossy3),
     ];
 
     /// The set of these kinds; those of two pictures ([`LayerKind::Relative`], [`LayerKind::Flip`]) are left out.
     #[must_use]
     pub fn of(kinds: &[LayerKind]) -> Self {
-        let bit = |i: usize| u8::from(kinds.contains(&Self::NAMED[i].1)) << i;
+        let bit = |i: usize| u16::from(kinds.contains(&Self::NAMED[i].1)) << i;
         Self((0..Self::NAMED.len()).map(bit).sum())
     }
 
@@ -50,6 +55,9 @@ impl LayerSet {
     }
 }
 
+/// Lobes that have a layer: the Lambert lobe, then Phong lobes.
+const LOBES: usize = 4;
+
 /// What one pixel has gathered beside its radiance.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Gathered {
@@ -61,6 +69,7 @@ pub(super) struct Gathered {
     depth: f64,
     direct: DVec3,
     indirect: DVec3,
+    lobes: [DVec3; LOBES],
 }
 
 impl Gathered {
@@ -70,6 +79,7 @@ impl Gathered {
         self.samples += 1;
         self.direct += direct;
         self.indirect += radiance - direct;
+        self.lobes.iter_mut().zip(sight.of_lobes(radiance)).for_each(|(sum, own)| *sum += own);
         if let Some(first) = &sight.first {
             self.hits += 1;
             self.albedo += first.albedo;
@@ -89,12 +99,12 @@ impl Gathered {
 }
 
 /// The layer of a kind from what every pixel has gathered; `None` for those of two pictures.
-pub(super) fn layer(kind: LayerKind, pixels: &[Gathered]) -> Option<Layer> {
+pub(super) fn layer(kind: LayerKind, pixels: &[&Gathered]) -> Option<Layer> {
     let colors = |sum: fn(&Gathered) -> DVec3| {
         let means: Vec<_> = pixels.iter().map(|p| p.mean(sum(p))).collect();
         Some(Layer::of_colors(kind, &means))
     };
-    let values = |value: fn(&Gathered) -> f64| Some(Layer::of_values(kind, pixels.iter().map(value).collect()));
+    let values = |value: fn(&Gathered) -> f64| Some(Layer::of_values(kind, pixels.iter().map(|p| value(p)).collect()));
     match kind {
         LayerKind::Albedo => colors(|p| p.albedo),
         LayerKind::Normal => colors(|p| p.normal),
@@ -102,6 +112,10 @@ pub(super) fn layer(kind: LayerKind, pixels: &[Gathered]) -> Option<Layer> {
         LayerKind::Samples => values(|p| f64::from(p.samples)),
         LayerKind::Direct => colors(|p| p.direct),
         LayerKind::Indirect => colors(|p| p.indirect),
+        LayerKind::Diffuse => colors(|p| p.lobes[0]),
+        LayerKind::Glossy1 => colors(|p| p.lobes[1]),
+        LayerKind::Glossy2 => colors(|p| p.lobes[2]),
+        LayerKind::Glossy3 => colors(|p| p.lobes[3]),
         LayerKind::Relative | LayerKind::Flip => None,
     }
 }
@@ -112,6 +126,33 @@ pub(super) struct Sight {
     first: Option<First>,
     /// The radiance after at most one scattering event; none where the path had no more.
     direct: Option<DVec3>,
+    /// Radiance that each lobe of the first surface reflected of light that was aimed at.
+    lobes: [DVec3; LOBES],
+    /// Where the path went on from there: the radiance until then, and the share that each lobe has in what comes.
+    onward: Option<(DVec3, [DVec3; LOBES])>,
+}
+
+impl Sight {
+    /// What each lobe of the first surface reflected, of a path of this radiance.
+    fn of_lobes(&self, radiance: DVec3) -> [DVec3; LOBES] {
+        let Some((before, shares)) = self.onward else { return self.lobes };
+        std::array::from_fn(|k| self.lobes[k] + shares[k] * (radiance - before))
+    }
+}
+
+/// The share of each lobe in a BRDF's value, channel by channel; 0 of what has no lobes.
+fn shares(brdf: &dyn Brdf, wi: DVec3, wo: DVec3) -> [DVec3; LOBES] {
+    let (mut all, mut total) = ([DVec3::ZERO; LOBES], DVec3::ZERO);
+    let Some(lobes) = brdf.lobes() else { return all };
+    lobes.split(wi, wo, |lobe, weight, value| {
+        let own = value * DVec3::from_array(std::array::from_fn(|c| weight[c.min(weight.len() - 1)]));
+        total += own;
+        if let Some(sum) = all.get_mut(lobe) {
+            *sum += own;
+        }
+    });
+    let is_some = total.cmpne(DVec3::ZERO);
+    all.map(|own| DVec3::select(is_some, own / total, DVec3::ZERO))
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -131,6 +172,15 @@ impl Watch for Sight {
 
     fn indirect_begins(&mut self, so_far: DVec3) {
         self.direct = Some(so_far);
+    }
+
+    fn first_reflects(&mut self, brdf: &dyn Brdf, (wi, wo): (DVec3, DVec3), radiance: DVec3) {
+        let shares = shares(brdf, wi, wo);
+        self.lobes.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share * radiance);
+    }
+
+    fn first_goes_on(&mut self, brdf: &dyn Brdf, (wi, wo): (DVec3, DVec3), so_far: DVec3) {
+        self.onward = Some((so_far, shares(brdf, wi, wo)));
     }
 }
 
@@ -161,8 +211,8 @@ mod tests {
     #[test]
     fn a_pixel_that_sees_nothing_is_infinitely_far() {
         let pixel = Gathered { samples: 3, ..Gathered::default() };
-        let depth = layer(LayerKind::Depth, &[pixel]).unwrap();
+        let depth = layer(LayerKind::Depth, &[&pixel]).unwrap();
         assert_eq!(depth.planes, [[f64::INFINITY]]);
-        assert_eq!(layer(LayerKind::Normal, &[pixel, Gathered::default()]).unwrap().planes[2], [0.0, 0.0]);
+        assert_eq!(layer(LayerKind::Normal, &[&pixel, &Gathered::default()]).unwrap().planes[2], [0.0, 0.0]);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::lights::Environment;
 use super::material::Material;
-use super::packet::{FlatScene, MOST_CLOSED};
+use super::packet::{FlatScene, MOST_CLOSED, Surroundings};
 use super::scene::Scene;
 use crate::control::{self, counted};
 
@@ -30,25 +30,23 @@ impl Plan {
     /// What the scene calls for.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
+        let surroundings = Surroundings::of(scene);
+        let lit = !scene.lights.is_empty() || scene.environment.is_some();
+        // Of meshes nothing is known.
+        let (shadows, interreflection) = surroundings
+            .map_or((lit, true), |all| (all.casts_shadows(scene.environment.is_some()), all.may_interreflect()));
+        let interreflection = scene.max_bounces > 1 && interreflection;
         match FlatScene::of(scene) {
-            Some(flat) => Self::of_flat(scene, &flat),
-            None => Self {
-                shadows: !scene.geometry.is_one_convex() && (!scene.lights.is_empty() || scene.environment.is_some()),
-                interreflection: scene.max_bounces > 1 && !scene.geometry.is_one_convex(),
-                chance: scene.rays_find_light(),
-                closed_forms: false,
-                packets: false,
+            Some(flat) => Self {
+                shadows,
+                interreflection,
+                chance: flat.must_find_light(),
+                closed_forms: flat.closed_lights() > 0 || flat.closed_environment(),
+                packets: true,
             },
-        }
-    }
-
-    fn of_flat(scene: &Scene, flat: &FlatScene<'_>) -> Self {
-        Self {
-            shadows: flat.casts_shadows(),
-            interreflection: scene.max_bounces > 1 && flat.may_interreflect(),
-            chance: flat.must_find_light(),
-            closed_forms: flat.closed_lights() > 0 || flat.closed_environment(),
-            packets: true,
+            None => {
+                Self { shadows, interreflection, chance: scene.rays_find_light(), closed_forms: false, packets: false }
+            }
         }
     }
 
@@ -134,6 +132,7 @@ fn why_closed_forms(scene: &Scene, flat: Option<&FlatScene<'_>>) -> String {
     match flat.map_or((0, false), |f| (f.closed_lights(), f.closed_environment())) {
         (0, true) => "one convex body in an even environment shows its directional albedo".into(),
         (0, false) if !scene.rays_find_light() => "there is no light to integrate over".into(),
+        (0, false) if flat.is_none() => "paths that are followed one at a time have none".into(),
         (0, false) => "lights may be hidden in part, or lobes are sharp".into(),
         (n, _) => format!(
             "nothing can hide {}: no samples of it but of materials with lobes sharper than n = {MOST_CLOSED}",

@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::super::lights::{Environment, Light, QuadLight};
 use super::super::material::Material;
 use super::super::scene::Scene;
-use super::super::shapes::{Owner, Sphere};
-use super::occluders::{Extent, Occluders};
+use super::super::shapes::{Owner, Plane, Quad, Sphere};
+use super::occluders::{Occluders, Surroundings};
 use super::surround::Surround;
 
 /// Shapes and materials that a scene may have: every ray asks all of them.
@@ -26,6 +26,21 @@ pub(super) struct Piece {
     pub to_b: DVec3,
     /// The largest coordinate of its own, m: what a computed point on it is off by grows with that.
     pub reach: f64,
+}
+
+impl Piece {
+    /// All of a plane.
+    pub fn of_plane(plane: &Plane) -> Self {
+        let reach = plane.point.abs().max_element();
+        Self { point: plane.point, normal: plane.normal, to_a: DVec3::ZERO, to_b: DVec3::ZERO, reach }
+    }
+
+    /// A quad.
+    pub fn of_quad(quad: &Quad) -> Self {
+        let (to_a, to_b) = quad.dual();
+        let reach = (quad.center.abs() + quad.u.abs() + quad.v.abs()).max_element();
+        Self { point: quad.center, normal: quad.normal, to_a, to_b, reach }
+    }
 }
 
 /// Whose a shape is: a material's index, or −1 less a light's.
@@ -74,7 +89,7 @@ impl<'a> FlatScene<'a> {
     /// The scene, where packets can walk through it: no meshes, no tables, no shading rules, no lights but points,
     /// parallel light, quads and an even environment, not too many shapes.
     pub fn of(scene: &'a Scene) -> Option<Self> {
-        let (spheres, planes, quads) = scene.geometry.analytic()?;
+        let surroundings = Surroundings::of(scene)?;
         let environment = match scene.environment {
             None => None,
             Some(Environment::Constant(radiance)) => Some(radiance),
@@ -84,40 +99,18 @@ impl<'a> FlatScene<'a> {
             return None;
         }
         let materials: Vec<Lobes> = scene.materials.iter().map(lobes).collect::<Option<_>>()?;
-        if spheres.len() + planes.len() + quads.len() > MOST_SHAPES || materials.len() > MOST_MATERIALS {
+        let Surroundings { spheres, pieces, surfaces, before_lights, before_environment } = surroundings;
+        if spheres.len() + pieces.len() > MOST_SHAPES || materials.len() > MOST_MATERIALS {
             return None;
         }
-        let reflects = |owner: &Owner| match owner {
-            Owner::Material(i) => !materials[*i].black,
-            Owner::Light { .. } => false,
-        };
-        let balls = spheres.iter().filter(|s| reflects(&s.1)).map(|s| Extent::Ball(s.0));
-        let endless = planes.iter().filter(|p| reflects(&p.1)).map(|p| Extent::Endless(p.0));
-        let corners = quads.iter().filter(|q| reflects(&q.1)).map(|q| Extent::of_quad(&q.0));
-        let surfaces: Vec<Extent> = balls.chain(endless).chain(corners).collect();
-        let spheres: Vec<_> = spheres.iter().map(|(sphere, owner)| (*sphere, number(*owner))).collect();
-        let planes = planes.iter().map(|(plane, owner)| {
-            let reach = plane.point.abs().max_element();
-            (Piece { point: plane.point, normal: plane.normal, to_a: DVec3::ZERO, to_b: DVec3::ZERO, reach }, *owner)
-        });
-        let quads = quads.iter().map(|(quad, owner)| {
-            let (to_a, to_b) = quad.dual();
-            let reach = (quad.center.abs() + quad.u.abs() + quad.v.abs()).max_element();
-            (Piece { point: quad.center, normal: quad.normal, to_a, to_b, reach }, *owner)
-        });
-        let pieces: Vec<_> = quads.chain(planes).map(|(piece, owner)| (piece, number(owner))).collect();
+        let spheres: Vec<_> = spheres.into_iter().map(|(sphere, owner)| (sphere, number(owner))).collect();
+        let pieces: Vec<_> = pieces.into_iter().map(|(piece, owner)| (piece, number(owner))).collect();
         let most = materials.iter().map(|m| m.phong.len()).max().unwrap_or(0);
-        let all = Occluders {
-            spheres: spheres.iter().map(|s| s.0).collect(),
-            pieces: pieces.iter().map(|p: &(Piece, OwnerNumber)| p.0).collect(),
-        };
-        let alone = spheres.len() + pieces.len() <= 1;
-        let before_lights: Vec<_> = scene.lights.iter().map(|light| Occluders::of(light, &all, &surfaces)).collect();
         let free = |(light, before): (&Light, &Occluders)| matches!(light, Light::Quad(_)) && before.is_empty();
         let closed = scene.lights.iter().zip(&before_lights).map(free).collect();
         Some(Self {
             before_lights,
-            before_environment: if alone { Occluders::default() } else { all },
+            before_environment,
             spheres,
             pieces,
             lobes: most,
@@ -126,19 +119,8 @@ impl<'a> FlatScene<'a> {
             environment,
             max_bounces: scene.max_bounces,
             closed,
-            surfaces: surfaces.len(),
+            surfaces,
         })
-    }
-
-    /// Whether more than one shape reflects. All are convex, so that one alone sees nothing of itself.
-    pub fn may_interreflect(&self) -> bool {
-        self.surfaces > 1
-    }
-
-    /// Whether anything may stand between a surface and a light or the environment.
-    pub fn casts_shadows(&self) -> bool {
-        let hides = |occluders: &Occluders| !occluders.is_empty();
-        self.before_lights.iter().any(hides) || self.environment.is_some() && hides(&self.before_environment)
     }
 
     /// Number of quads that nothing can hide, where what a surface reflects of them has a closed form.

@@ -3,7 +3,9 @@
 use glam::DVec3;
 
 use super::super::lights::Light;
-use super::super::shapes::{Plane, Quad, Sphere};
+use super::super::material::Material;
+use super::super::scene::Scene;
+use super::super::shapes::{Owner, Plane, Quad, Sphere};
 use super::flat::Piece;
 
 /// Shapes that may hide a light from a surface.
@@ -11,6 +13,57 @@ use super::flat::Piece;
 pub(super) struct Occluders {
     pub spheres: Vec<Sphere>,
     pub pieces: Vec<Piece>,
+}
+
+/// A scene of spheres, planes and quads: what reflects, and what may stand in the way.
+#[derive(Debug)]
+pub(in crate::render) struct Surroundings {
+    pub(super) spheres: Vec<(Sphere, Owner)>,
+    pub(super) pieces: Vec<(Piece, Owner)>,
+    /// How many of the shapes reflect.
+    pub(super) surfaces: usize,
+    /// What may hide each light from a surface.
+    pub(super) before_lights: Vec<Occluders>,
+    /// What may hide the environment.
+    pub(super) before_environment: Occluders,
+}
+
+impl Surroundings {
+    /// Those of a scene; `None` of one with meshes.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        let (spheres, planes, quads) = scene.geometry.analytic()?;
+        let reflects = |owner: &Owner| match owner {
+            Owner::Material(i) => !matches!(scene.materials[*i], Material::Black),
+            Owner::Light { .. } => false,
+        };
+        let balls = spheres.iter().filter(|s| reflects(&s.1)).map(|s| Extent::Ball(s.0));
+        let endless = planes.iter().filter(|p| reflects(&p.1)).map(|p| Extent::Endless(p.0));
+        let corners = quads.iter().filter(|q| reflects(&q.1)).map(|q| Extent::of_quad(&q.0));
+        let surfaces: Vec<Extent> = balls.chain(endless).chain(corners).collect();
+        let planes = planes.iter().map(|(plane, owner)| (Piece::of_plane(plane), *owner));
+        let quads = quads.iter().map(|(quad, owner)| (Piece::of_quad(quad), *owner));
+        let pieces: Vec<(Piece, Owner)> = quads.chain(planes).collect();
+        let all =
+            Occluders { spheres: spheres.iter().map(|s| s.0).collect(), pieces: pieces.iter().map(|p| p.0).collect() };
+        Some(Self {
+            spheres: spheres.to_vec(),
+            before_lights: scene.lights.iter().map(|light| Occluders::of(light, &all, &surfaces)).collect(),
+            before_environment: if spheres.len() + pieces.len() <= 1 { Occluders::default() } else { all },
+            pieces,
+            surfaces: surfaces.len(),
+        })
+    }
+
+    /// Whether more than one shape reflects. All are convex, so that one alone sees nothing of itself.
+    pub fn may_interreflect(&self) -> bool {
+        self.surfaces > 1
+    }
+
+    /// Whether anything may stand between a surface and a light or the `environment`, where there is one.
+    pub fn casts_shadows(&self, environment: bool) -> bool {
+        let hides = |occluders: &Occluders| !occluders.is_empty();
+        self.surfaces > 0 && (self.before_lights.iter().any(hides) || environment && hides(&self.before_environment))
+    }
 }
 
 /// How far a shape reaches, for signed distances from planes.
@@ -77,7 +130,12 @@ fn may_hide(piece: &Piece, surfaces: &[Extent], light: &Light) -> bool {
             }
             Extent::of_quad(quad).distances(point, normal)
         }
-        Light::Spot(_) | Light::Sphere(_) | Light::Mesh(_) => return true,
+        Light::Spot(light) => {
+            let d = (light.position - point).dot(normal);
+            (d, d)
+        }
+        Light::Sphere(light) => Extent::Ball(light.sphere).distances(point, normal),
+        Light::Mesh(_) => return true,
     };
     let above = low >= -slack && light_low >= -light_slack;
     let below = high <= slack && light_high <= light_slack;
@@ -88,8 +146,10 @@ impl Occluders {
     /// Those of a light, out of all shapes of a scene; `surfaces` are those that reflect.
     pub fn of(light: &Light, all: &Self, surfaces: &[Extent]) -> Self {
         let pieces = all.pieces.iter().filter(|piece| may_hide(piece, surfaces, light)).copied().collect();
-        // A ball hides nothing from the points of its own that face the light.
-        let others = |ball: &&Sphere| surfaces.iter().any(|s| !matches!(s, Extent::Ball(b) if b == *ball));
+        // A ball hides nothing from the points of its own that face the light, and a shining one nothing of itself.
+        let shines = |ball: &Sphere| matches!(light, Light::Sphere(own) if own.sphere == *ball);
+        let others =
+            |ball: &&Sphere| !shines(ball) && surfaces.iter().any(|s| !matches!(s, Extent::Ball(b) if b == *ball));
         Self { spheres: all.spheres.iter().filter(others).copied().collect(), pieces }
     }
 

@@ -86,7 +86,8 @@ fn resolve(spec: &SceneSpec, name: &str, own: &MaterialSpec, given: &Materials) 
         let found = brdf.channels();
         return Err(fail(format!("expected 1 channel (grey) or 3 (red, green, blue), found {found}; choose three")));
     }
-    Ok(material)
+    let is_black = matches!(&material, Material::Brdf(brdf) if brdf.lobes().is_some_and(Reflectance::is_black));
+    Ok(if is_black { Material::Black } else { material })
 }
 
 /// A material that the scene describes itself; otherwise the file that it is in.

@@ -127,7 +127,7 @@ fn without_surface(spec: &LightsSpec, origin: DVec3) -> Vec<Light> {
 pub(super) fn environment(spec: &SceneSpec, base: &Path) -> Result<Option<Environment>, RenderError> {
     let Some(described) = &spec.lights.environment else { return Ok(None) };
     if let Some(radiance) = described.radiance {
-        return Ok(Some(Environment::Constant(radiance.into())));
+        return Ok(Some(DVec3::from(radiance)).filter(|r| *r != DVec3::ZERO).map(Environment::Constant));
     }
     let scale = described.scale.unwrap_or(1.0);
     let turn = (described.rotate_deg.unwrap_or(0.0) % 360.0).to_radians();

@@ -69,11 +69,6 @@ impl Geometry {
         (self.triangles.is_none() && self.instances.is_none()).then_some((&self.spheres, &self.planes, &self.quads))
     }
 
-    /// Whether there is nothing but one sphere, plane or quad.
-    pub fn is_one_convex(&self) -> bool {
-        self.analytic().is_some() && self.shapes() == 1
-    }
-
     /// Number of shapes, all meshes that stand in one place together being one.
     pub fn shapes(&self) -> usize {
         let placed = self.instances.as_ref().map_or(0, Instances::len);
