@@ -83,9 +83,8 @@ impl Cost {
 
 #[derive(Debug, Clone, Deserialize)]
 struct Setting {
-    /// How it is typed.
-    #[serde(default)]
-    setting: String,
+    #[serde(rename = "setting", default)]
+    typed: String,
     size: Option<f64>,
     seconds: Interval,
     instrument_s: Option<f64>,
@@ -223,7 +222,7 @@ impl Sweep {
         Some(FrontSetting {
             is_undecided,
             curve: &curve.name,
-            setting: &point.setting,
+            setting: &point.typed,
             seconds: point.time(curve.cost),
             measure: &curve.main,
             error: point.errors.get(measure).copied().flatten()?,
