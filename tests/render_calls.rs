@@ -45,7 +45,7 @@ fn opaque(rest: &str) -> Scene {
 #[test]
 fn a_table_alone_under_its_lights_casts_no_shadow_and_sees_nothing_of_itself() {
     let lights = [
-        "[[light.quad]]\ncenter = [0, 3, 1]\nu = [0, 0, 1]\nv = [1, 0, 0]\nradiance = [5, 5, 5]\n",
+        "[[light.quad]]\ncenter = [0, 3, 1]\nu = [1, 0, 0]\nv = [0, 0, 1]\nradiance = [5, 5, 5]\n",
         "[[light.sphere]]\ncenter = [2, 3, 1]\nradius = 0.5\nradiance = [9, 9, 9]\n",
         "[[light.spot]]\nposition = [2, 3, 1]\ndirection = [-2, -3, -1]\nintensity = [50, 50, 50]\ninner_deg = 20\nouter_deg = 30\n",
     ];
@@ -78,7 +78,7 @@ fn what_weighs_nothing_is_not_there() {
         let spec = SceneSpec::parse(&text, "t").expect("a scene");
         Scene::build(&spec, std::path::Path::new("."), &Materials::new()).expect("builds")
     };
-    let lamp = "[[light.quad]]\ncenter = [0, 3, 1]\nu = [0, 0, 1]\nv = [1, 0, 0]\nradiance = [5, 5, 5]\n";
+    let lamp = "[[light.quad]]\ncenter = [0, 3, 1]\nu = [1, 0, 0]\nv = [0, 0, 1]\nradiance = [5, 5, 5]\n";
     let on = |scene: &Scene| -> Vec<&'static str> {
         let plan = Plan::of(scene).effects(scene);
         plan.effects.iter().filter(|e| e.on).map(|e| e.name).collect()

@@ -83,7 +83,7 @@ fn what_cannot_be_drawn_is_said() {
     b.write("flat.csv", std::fs::read(fixture("measurements/in-plane-flat-world.csv")).expect("reads"));
     let setting = |s: f64| format!(r#"{{"seconds": {{"value": {s}}}, "errors": [{{"value": {s}, "low": {s}}}]}}"#);
     let sweep = |settings: &str| {
-        let curve = format!(r#"{{"name": "c", "main": "error", "knob": "effects", "points": [{settings}]}}"#);
+        let curve = format!(r#"{{"name": "c", "main": "error", "knob": "stride", "points": [{settings}]}}"#);
         format!(r#"{{"stage": "fit", "subject": "s", "measures": [{{"name": "error"}}], "curves": [{curve}]}}"#)
     };
     b.write("sweep.json", sweep(&setting(1.0)));
