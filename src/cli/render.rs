@@ -91,7 +91,7 @@ pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
     pair.ok_or_else(|| "expected WIDTHxHEIGHT or one number, 1 to 16384".into())
 }
 
-fn parse_rgb(text: &str) -> Result<[String; 3], String> {
+pub(super) fn parse_rgb(text: &str) -> Result<[String; 3], String> {
     let names: Vec<String> = text.split(',').map(|s| s.trim().to_owned()).collect();
     names.try_into().map_err(|_| "expected three channel names with commas between".into())
 }

@@ -67,7 +67,7 @@ pub struct Job<'a> {
     pub seed: u64,
     /// Relative error that means over source and aperture may have.
     pub accuracy: f64,
-    /// One order of the rules over source, aperture and spot, instead of those that `accuracy` asks for: 1 to [`MOST_ORDER`]. What it leaves is not
+    /// One order of the rules over source, aperture and spot, instead of those that `accuracy` asks for: 1 to twice [`MOST_ORDER`]. What it leaves is not
     /// known then: [`Raw::quadrature_error`] is infinite.
     pub order: Option<u32>,
     /// Effects that are left out, by name.

@@ -157,7 +157,7 @@ fn rules_over_the_cones_of_a_table_have_the_order_of_its_kinks() {
     let b = Bench::new();
     b.paint("paint.csv");
     let args = typed(
-        "tradeoff simulate --material paint.csv --instrument commercial --scan in-plane:15 --knobs order --orders 1,2,4,8 --trials 2",
+        "tradeoff simulate --material paint.csv --instrument commercial --scan in-plane:15 --knobs order --orders 1,2,3,4 --trials 2",
     );
     let found = b.json(&args);
     let slope = slope(&found, "order of the rules", "reading");
@@ -180,11 +180,11 @@ fn the_whole_chain_is_off_by_what_its_links_say() {
     let predicted = number(&share["from_data"]).hypot(number(&share["from_pixels"]));
     let measured = number(&share["measured"]["value"]);
     assert!((measured / predicted - 1.0).abs() < 0.2, "{measured} of {predicted}");
-    // From reading to image: four times the readings leave half of each error.
-    for name in ["brdf", "parameters", "image"] {
+    // From reading to image: four times the readings leave half of each error; of readings darker than their noise, whose change is 1 at most, less.
+    for (name, least) in [("brdf", 1.3), ("parameters", 1.4), ("image", 1.4)] {
         let errors = errors(&found, "readings, all fitted", name);
         let ratio = errors[0] / errors[1];
-        assert!((1.4..2.9).contains(&ratio), "{name}: {errors:?}");
+        assert!((least..2.9).contains(&ratio), "{name}: {errors:?}");
     }
     // Links leave out what the others bring: advice is of the whole.
     let asked = b.json(&[&args[..], &["--advise", "error=50%"]].concat());

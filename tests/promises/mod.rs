@@ -191,7 +191,7 @@ pub fn simulate(sweeps: u64, trials: u32, step_deg: f64) -> Kept {
 /// `chain`, for the picture: readings, stride and samples as they were shared out.
 pub fn chain(sweeps: u64, trials: u32, error: f64) -> Kept {
     let material = paint();
-    let instrument = Instrument { electrons: 300.0, ..Instrument::default() };
+    let instrument = Instrument { electrons: 3e4, ..Instrument::default() };
     let stage = Stage::built_in("sphere").expect("built in");
     let sweep = |readings: Vec<u32>, strides: Vec<usize>, samples: Vec<u32>, effort: Effort| {
         let what = ChainSweep {

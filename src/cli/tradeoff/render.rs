@@ -6,7 +6,7 @@ use super::Common;
 use crate::chain::{self, Stage};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
-use crate::cli::render::{parse_size, read_stage};
+use crate::cli::render::{parse_rgb, parse_size, read_stage};
 use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
 use crate::measurement::ReadOptions;
@@ -32,8 +32,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     material: Option<String>,
     /// Channels to show as red, green and blue
-    #[arg(long, value_delimiter = ',', num_args = 3, value_name = "A,B,C")]
-    rgb: Option<Vec<String>>,
+    #[arg(long, value_parser = parse_rgb, value_name = "A,B,C")]
+    rgb: Option<[String; 3]>,
     /// Size of the pictures in pixels, WIDTHxHEIGHT or one number for both [default: 64 at most, in the scene's proportions]
     #[arg(long, value_parser = parse_size, value_name = "SIZE")]
     size: Option<(u32, u32)>,
@@ -80,9 +80,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             (Stage::built_in(name)?, option("scene", Some(name)))
         }
     };
-    let rgb: Option<[String; 3]> = args.rgb.clone().and_then(|names| names.try_into().ok());
     let subject = match &args.material {
-        Some(name) => Some(chain::render_material(name, &chain::load(name, &ReadOptions::default())?, rgb.as_ref())?),
+        Some(name) => {
+            Some(chain::render_material(name, &chain::load(name, &ReadOptions::default())?, args.rgb.as_ref())?)
+        }
         None => None,
     };
     let [width, height] = stage.spec.film.resolution.map(f64::from);

@@ -34,7 +34,7 @@ pub(super) struct Args {
     #[arg(long, value_delimiter = ',', value_name = "E,E,…", default_value = "0.1,0.01,1e-3,1e-4,1e-6,1e-8", value_parser = parse_tolerance)]
     target_errors: Vec<f64>,
     /// Orders of the rules over cones and spot, for the knob `order`
-    #[arg(long, value_delimiter = ',', value_name = "M,M,…", default_value = "1,2,3,4,6,8", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_ORDER)))]
+    #[arg(long, value_delimiter = ',', value_name = "M,M,…", default_value = "1,2,3,4", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_ORDER)))]
     orders: Vec<u32>,
     #[command(flatten)]
     common: Common,

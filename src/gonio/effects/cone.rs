@@ -99,9 +99,9 @@ impl Cones {
         cones
     }
 
-    /// The same with one order of the wider cone's rule, and nothing known of what it leaves.
+    /// The same with one order of both cones' rules, and nothing known of what it leaves.
     pub fn fixed(mut self, order: u32) -> Self {
-        self.fixed = Some(self.made(order));
+        self.fixed = Some(self.made([order as usize; 2]));
         self
     }
 
@@ -119,12 +119,11 @@ impl Cones {
     }
 
     fn rules(&self, level: usize) -> &Rules {
-        self.rules[level].get_or_init(|| self.made(1 << level))
+        self.rules[level].get_or_init(|| self.made(self.orders(1 << level)))
     }
 
-    fn made(&self, m: u32) -> Rules {
+    fn made(&self, orders: [usize; 2]) -> Rules {
         let rule = if self.dimension == Dimension::Flat { flat_rule } else { rule };
-        let orders = self.orders(m);
         [0, 1].map(|k| rule(orders[k], self.half[k]))
     }
 

@@ -60,6 +60,8 @@ pub(super) struct Bench<'a> {
     control: Control<'a>,
     /// Readings without noise to the finest accuracy, and the round that they are of: no other reads them.
     finest: Option<(u32, Raw)>,
+    /// The same by rules of twice the highest order.
+    highest: Option<(u32, Raw)>,
     /// Readings of a round with all effects but noise, or with the one kind of noise that is looked at.
     whole: HashMap<Option<&'static str>, (u32, Judged)>,
     /// True values, by scan.
@@ -77,7 +79,7 @@ struct Judged {
 impl<'a> Bench<'a> {
     pub fn new(what: &'a SimulateSweep<'a>, seed: u64, control: Control<'a>) -> Self {
         let (whole, truths) = (HashMap::new(), HashMap::new());
-        Self { what, seed, control, finest: None, whole, truths, quadrature_error: 0.0 }
+        Self { what, seed, control, finest: None, highest: None, whole, truths, quadrature_error: 0.0 }
     }
 
     /// What the references are.
@@ -87,6 +89,12 @@ impl<'a> Bench<'a> {
             said.push(format!(
                 "quadratures: the same readings with means over cones to {FINEST:.0e}; their last doubling moved them by {:.1e} at most",
                 self.quadrature_error
+            ));
+        }
+        if self.highest.is_some() {
+            said.push(format!(
+                "orders: the same readings by rules of order {}: where errors fall by the square, they have a quarter of the last one's",
+                self.highest_order()
             ));
         }
         if !self.whole.is_empty() {
@@ -113,8 +121,8 @@ impl<'a> Bench<'a> {
 
     pub fn trial(&mut self, read: &Read, turn: Turn) -> Result<Trial, ChainError> {
         match read {
-            Read::Quadrature(accuracy) => self.quadrature((*accuracy, None), turn.round),
-            Read::Order(order) => self.quadrature((ACCURACY, Some(*order)), turn.round),
+            Read::Quadrature(accuracy) => self.quadrature(*accuracy, turn.round),
+            Read::Order(order) => self.order(*order, turn.round),
             Read::Without(name) => self.without(*name, turn.round),
             Read::Noisy { instrument, scan } => self.noisy(instrument, scan, turn.seed),
         }
@@ -136,7 +144,7 @@ impl<'a> Bench<'a> {
         mix(self.seed ^ mix(u64::from(round)))
     }
 
-    fn quadrature(&mut self, rules: Rules, round: u32) -> Result<Trial, ChainError> {
+    fn quadrature(&mut self, accuracy: f64, round: u32) -> Result<Trial, ChainError> {
         let seed = self.instrument_of(round);
         self.finest.take_if(|(of, _)| *of != round);
         if self.finest.is_none() {
@@ -144,8 +152,26 @@ impl<'a> Bench<'a> {
             self.quadrature_error = self.quadrature_error.max(raw.quadrature_error);
             self.finest = Some((round, raw));
         }
-        let (raw, seconds) = self.read(rules, &NOISE, seed)?;
+        let (raw, seconds) = self.read((accuracy, None), &NOISE, seed)?;
         let error = self.finest.as_ref().map_or(f64::NAN, |(_, finest)| of_samples(&raw, finest));
+        Ok(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN] })
+    }
+
+    fn highest_order(&self) -> u32 {
+        2 * self.what.orders.iter().copied().max().unwrap_or(1)
+    }
+
+    fn order(&mut self, order: u32, round: u32) -> Result<Trial, ChainError> {
+        let seed = self.instrument_of(round);
+        let known = self.highest.take().filter(|(of, _)| *of == round);
+        let by = |order: u32| self.read((ACCURACY, Some(order)), &NOISE, seed);
+        let (raw, seconds) = by(order)?;
+        let reference = match known {
+            Some(known) => known,
+            None => (round, by(self.highest_order())?.0),
+        };
+        let error = of_samples(&raw, &reference.1);
+        self.highest = Some(reference);
         Ok(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN] })
     }
 
