@@ -211,7 +211,7 @@ fn meshes(c: &mut Criterion) {
     for (name, bytes) in [("ply", ply(&points, &faces)), ("obj", obj(&points, &faces)), ("glb", glb(&points, &faces))] {
         std::fs::write(folder.path().join(format!("sheet.{name}")), bytes).expect("writes");
         let scene = format!(
-            "version = 1\nname = \"sheet\"\n[camera]\nposition = [0, 2, 3]\ntarget = [0, 0, 0]\nfov_deg = 40\n\
+            "version = 1\nname = \"sheet\"\nmax_bounces = 1\n[camera]\nposition = [0, 2, 3]\ntarget = [0, 0, 0]\nfov_deg = 40\n\
              [materials]\nm = {{ kd = [0.5, 0.5, 0.5] }}\n[[mesh]]\nfile = \"sheet.{name}\"\nmaterial = \"m\"\n\
              [[light.point]]\nposition = [0, 3, 0]\nintensity = [1, 1, 1]\n"
         );
