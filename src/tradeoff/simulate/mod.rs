@@ -10,6 +10,7 @@ use super::sweep::{Effort, run};
 use crate::chain::{ChainError, Source};
 use crate::control::Control;
 use crate::gonio::{self, Instrument, Scan, lit_rows};
+use crate::measurement::Directions;
 
 mod bench;
 
@@ -176,8 +177,9 @@ impl Designed<'_> {
         if self.what.orders.is_empty() {
             return;
         }
-        // Of a smooth material errors fall faster than by any power.
-        let law = Some(KINKED).filter(|_| matches!(self.what.source, Source::Measured(_)));
+        // Of a smooth material errors fall faster than by any power; of scattered directions nothing is known.
+        let is_grid = |source: &Source| matches!(source, Source::Measured(table) if matches!(table.directions, Directions::Merl(_)));
+        let law = Some(KINKED).filter(|_| is_grid(self.what.source));
         self.begin("order of the rules", Knob::Order, Cost::Computer, 0, vec![law, None, None]);
         for &order in &self.what.orders {
             self.push(f64::from(order), Knob::Order.typed(f64::from(order), 0.0), Read::Order(order));
