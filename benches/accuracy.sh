@@ -23,6 +23,7 @@ run render-merl render --scene sphere-on-plane --material "$gold" --samples 4,8,
 run render-cornell render --scene cornell --depths 1,3 --targets 20%,10%,5%
 run simulate-plain simulate --material glossy-paint --scan hemisphere:10 --knobs readings,exposure,step --trials 16
 run quadrature simulate --material "$gold" --instrument commercial --scan in-plane:15 --knobs quadrature --target-errors 0.3,0.1,1e-2,1e-3,1e-4,1e-5,1e-6,1e-7 --trials 3
+run order simulate --material "$gold" --instrument commercial --scan in-plane:30 --knobs order --trials 2
 for instrument in standards-lab commercial robot classroom; do
     run "simulate-$instrument" simulate --material glossy-paint --instrument "$instrument" --scan in-plane:5 --knobs readings,effects --average 1,4,16,64
 done

@@ -2,32 +2,15 @@
 #![allow(clippy::expect_used)] // these are tests
 
 mod common;
+mod furnace_support;
 
 use std::sync::Arc;
 
-use glam::DVec3;
-use goniofit::brdf::{Brdf, Reflectance, Sample};
-use goniofit::control::Control;
+use common::{picture_by, scene, scene_with};
+use furnace_support::Opaque;
+use goniofit::brdf::Reflectance;
 use goniofit::image::compare;
-use goniofit::render::{Material, Materials, Options, Plan, Scene, SceneSpec, render};
-
-/// Lobes that don't tell that they are, as a table can't.
-struct Opaque(Reflectance);
-
-impl Brdf for Opaque {
-    fn channels(&self) -> usize {
-        self.0.channels()
-    }
-    fn eval(&self, wi: DVec3, wo: DVec3, out: &mut [f64]) -> bool {
-        self.0.eval(wi, wo, out)
-    }
-    fn sample(&self, wo: DVec3, u: [f64; 3]) -> Option<Sample> {
-        self.0.sample(wo, u)
-    }
-    fn pdf(&self, wi: DVec3, wo: DVec3) -> f64 {
-        self.0.pdf(wi, wo)
-    }
-}
+use goniofit::render::{Material, Materials, Plan, Scene};
 
 const HEAD: &str =
     "version = 1\nname = \"t\"\nmax_bounces = 5\n[camera]\nposition = [0, 0, 4]\ntarget = [0, 0, 0]\nfov_deg = 40\n";
@@ -35,11 +18,9 @@ const BALL: &str = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"
 
 /// A scene whose material `m` is opaque.
 fn opaque(rest: &str) -> Scene {
-    let text = format!("{HEAD}[materials]\nm = {{ file = \"table.csv\" }}\n{rest}");
-    let spec = SceneSpec::parse(&text, "t").expect("a scene");
-    let brdf = Opaque(Reflectance::lobes(vec![0.3; 3], [(vec![0.4; 3], 30.0)]));
+    let brdf = Opaque(Arc::new(Reflectance::lobes(vec![0.3; 3], [(vec![0.4; 3], 30.0)])));
     let materials = Materials::from([("m".to_owned(), Material::Brdf(Arc::new(brdf)))]);
-    Scene::build(&spec, std::path::Path::new("."), &materials).expect("builds")
+    scene_with(&format!("{HEAD}[materials]\nm = {{ file = \"table.csv\" }}\n{rest}"), &materials)
 }
 
 #[test]
@@ -53,11 +34,8 @@ fn a_table_alone_under_its_lights_casts_no_shadow_and_sees_nothing_of_itself() {
         let scene = opaque(&format!("{BALL}{light}"));
         let plan = Plan::of(&scene);
         assert!(!plan.shadows && !plan.interreflection && !plan.packets, "{light}: {plan:?}");
-        let shot = |plan: Option<Plan>, seed: u64| {
-            let options = Options { width: 24, height: 24, samples: 64, seed, plan, ..Options::default() };
-            render(&scene, &options, Control::silent()).expect("renders").to_image()
-        };
-        let found = compare(&shot(None, 1), &shot(Some(Plan::FULL), 2)).expect("one size").significance;
+        let shot = |plan: Plan, seed: u64| picture_by(plan, &scene, 24, 64, seed).to_image();
+        let found = compare(&shot(plan, 1), &shot(Plan::FULL, 2)).expect("one size").significance;
         let found = found.expect("noise is known");
         assert!(!found.differs, "{light}: {found:?}");
     }
@@ -73,11 +51,7 @@ fn a_table_alone_under_its_lights_casts_no_shadow_and_sees_nothing_of_itself() {
 
 #[test]
 fn what_weighs_nothing_is_not_there() {
-    let build = |materials: &str, rest: &str| {
-        let text = format!("{HEAD}[materials]\n{materials}\n{rest}");
-        let spec = SceneSpec::parse(&text, "t").expect("a scene");
-        Scene::build(&spec, std::path::Path::new("."), &Materials::new()).expect("builds")
-    };
+    let build = |materials: &str, rest: &str| scene(&format!("{HEAD}[materials]\n{materials}\n{rest}"));
     let lamp = "[[light.quad]]\ncenter = [0, 3, 1]\nu = [1, 0, 0]\nv = [0, 0, 1]\nradiance = [5, 5, 5]\n";
     let on = |scene: &Scene| -> Vec<&'static str> {
         let plan = Plan::of(scene).effects(scene);

@@ -10,13 +10,13 @@ mod reference_support;
 
 use goniofit::render::SceneSpec;
 use goniofit::render::scene::builtin;
-use reference_support::{Noise, Pair, references};
+use reference_support::{Noise, Shot, references};
 
 const SHRINK: usize = 8;
 
 /// Whether pixels, and blocks of 4 × 4 of them, agree; `None` where there is no reference.
 fn agrees(of: &(&str, SceneSpec, f64), samples: u32) -> Option<bool> {
-    let pair = Pair::of(of, samples, SHRINK, Noise::Careful)?;
+    let pair = Shot::of(of, samples, SHRINK)?.with(Noise::Careful);
     let found = [1, 4].map(|blocks| pair.tested(blocks));
     for (s, blocks) in found.iter().zip([1, 4]) {
         println!(

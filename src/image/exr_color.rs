@@ -1,6 +1,5 @@
 //! The colours alone of an OpenEXR file, as 32-bit floats: for pictures that light a scene, which can be large.
 
-use std::io::Cursor;
 use std::path::Path;
 
 use exr::meta::header::Header;
@@ -8,7 +7,7 @@ use exr::prelude as ex;
 use exr::prelude::{ReadChannels, ReadLayers};
 
 use super::ImageError;
-use super::exr_header::{check_length, check_pixels};
+use super::exr_header::{invalid, open};
 
 /// Linear RGB pixels along rows, row 0 on top.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,13 +27,8 @@ pub struct ColorGrid {
 /// [`ImageError`] naming the file and what was expected.
 pub fn read_exr_colors(path: &Path, most: u64) -> Result<ColorGrid, ImageError> {
     let bytes = std::fs::read(path).map_err(|source| ImageError::Io { path: path.into(), source })?;
-    let length = bytes.len();
-    let invalid =
-        |e: exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
-    let chunks = exr::block::read(Cursor::new(bytes), false).map_err(invalid)?;
-    check_pixels(path, chunks.headers(), most)?;
-    check_length(path, chunks.headers(), length)?;
-    check_channels(path, chunks.headers())?;
+    let blocks = open(path, bytes, (most, u64::MAX))?;
+    check_channels(path, blocks.headers())?;
     let create = |size: ex::Vec2<usize>, _: &_| ColorGrid {
         width: size.width(),
         height: size.height(),
@@ -47,8 +41,8 @@ pub fn read_exr_colors(path: &Path, most: u64) -> Result<ColorGrid, ImageError> 
         }
     };
     let channels = ex::read().no_deep_data().largest_resolution_level().rgb_channels(create, set);
-    let file = channels.first_valid_layer().all_attributes().non_parallel().from_chunks(chunks);
-    Ok(file.map_err(invalid)?.layer_data.channel_data.pixels)
+    let file = channels.first_valid_layer().all_attributes().non_parallel().from_chunks(blocks);
+    Ok(file.map_err(|e| invalid(path, &e))?.layer_data.channel_data.pixels)
 }
 
 /// Refuses what has no R, G and B.

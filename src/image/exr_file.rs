@@ -11,7 +11,7 @@ use std::path::Path;
 use exr::prelude as ex;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 
-use super::exr_header::{check_length, check_pixels, check_values};
+use super::exr_header::{invalid, open};
 use super::{Image, ImageError, Layer, LayerKind, MAX_PIXELS, Metadata};
 
 type Channel = ex::AnyChannel<ex::FlatSamples>;
@@ -78,15 +78,9 @@ pub fn decode_exr(path: &Path, bytes: Vec<u8>) -> Result<Image, ImageError> {
 
 /// All channels of all layers, if the header claims no more than there can be.
 fn read_all(path: &Path, bytes: Vec<u8>) -> Result<ex::FlatImage, ImageError> {
-    let invalid =
-        |e: exr::error::Error| ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: e.to_string() };
-    let length = bytes.len();
-    let chunks = exr::block::read(Cursor::new(bytes), false).map_err(invalid)?;
-    check_pixels(path, chunks.headers(), MAX_PIXELS)?;
-    check_values(path, chunks.headers(), MAX_PIXELS * most_channels())?;
-    check_length(path, chunks.headers(), length)?;
+    let blocks = open(path, bytes, (MAX_PIXELS, MAX_PIXELS * most_channels()))?;
     let read = ex::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    read.non_parallel().from_chunks(chunks).map_err(invalid)
+    read.non_parallel().from_chunks(blocks).map_err(|e| invalid(path, &e))
 }
 
 /// Channels of a picture with all that [`encode_exr`] writes. Other programs' pictures may have more of them, the smaller

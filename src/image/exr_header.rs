@@ -1,20 +1,42 @@
 //! What the headers of an OpenEXR file claim, checked before there is room made for it.
 
+use std::io::Cursor;
 use std::path::Path;
 
+use exr::block::reader::Reader;
 use exr::meta::header::Header;
 use exr::prelude::Compression;
 
 use super::ImageError;
 
+/// The blocks of a file, whose header claims at most so many pixels a layer, so many values over all channels of all layers, and no more than its bytes can
+/// hold.
+pub(super) fn open(
+    path: &Path,
+    bytes: Vec<u8>,
+    (most_pixels, most_values): (u64, u64),
+) -> Result<Reader<Cursor<Vec<u8>>>, ImageError> {
+    let length = bytes.len();
+    let blocks = exr::block::read(Cursor::new(bytes), false).map_err(|e| invalid(path, &e))?;
+    check_pixels(path, blocks.headers(), most_pixels)?;
+    check_values(path, blocks.headers(), most_values)?;
+    check_length(path, blocks.headers(), length)?;
+    Ok(blocks)
+}
+
+/// What the reader says is wrong with a file.
+pub(super) fn invalid(path: &Path, error: &exr::error::Error) -> ImageError {
+    ImageError::Invalid { path: path.into(), format: "OpenEXR", reason: error.to_string() }
+}
+
 /// Refuses a layer of more than `most` pixels.
-pub(super) fn check_pixels(path: &Path, headers: &[Header], most: u64) -> Result<(), ImageError> {
+fn check_pixels(path: &Path, headers: &[Header], most: u64) -> Result<(), ImageError> {
     let large = headers.iter().find(|header| pixels(header) > most);
     large.map_or(Ok(()), |header| Err(unsupported(path, format!("at most {most} pixels"), size(header))))
 }
 
 /// Refuses more than `most` values, of all channels of all layers together.
-pub(super) fn check_values(path: &Path, headers: &[Header], most: u64) -> Result<(), ImageError> {
+fn check_values(path: &Path, headers: &[Header], most: u64) -> Result<(), ImageError> {
     let values = |header: &Header| pixels(header).saturating_mul(header.channels.list.len() as u64);
     let found = headers.iter().map(values).fold(0, u64::saturating_add);
     if found <= most {
@@ -24,7 +46,7 @@ pub(super) fn check_values(path: &Path, headers: &[Header], most: u64) -> Result
 }
 
 /// Refuses what the file's `length` bytes can't hold, however well it is compressed.
-pub(super) fn check_length(path: &Path, headers: &[Header], length: usize) -> Result<(), ImageError> {
+fn check_length(path: &Path, headers: &[Header], length: usize) -> Result<(), ImageError> {
     let least = headers.iter().map(least_bytes).fold(0, u64::saturating_add);
     if least <= length as u64 {
         return Ok(());

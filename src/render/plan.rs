@@ -32,7 +32,7 @@ impl Plan {
     pub fn of(scene: &Scene) -> Self {
         let surroundings = Surroundings::of(scene);
         let lit = !scene.lights.is_empty() || scene.environment.is_some();
-        // Of meshes nothing is known.
+        // Of meshes, and of many shapes, nothing is known.
         let (shadows, interreflection) = surroundings
             .map_or((lit, true), |all| (all.casts_shadows(scene.environment.is_some()), all.may_interreflect()));
         let interreflection = scene.max_bounces > 1 && interreflection;

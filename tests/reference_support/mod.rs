@@ -130,7 +130,42 @@ fn with_noise(
     (Image { standard_error: Some(errors), ..image }, theirs)
 }
 
-/// A picture and its reference with the noise of both, at the reference's size over `by`; `None` where there is no reference.
+/// A picture of a scene, and its reference.
+pub struct Shot {
+    film: Film,
+    full: Image,
+    by: usize,
+    samples: u32,
+    /// Samples that each of its pixels has in the reference.
+    theirs: f64,
+}
+
+impl Shot {
+    /// Renders the scene at the reference's size over `by`; `None` where there is no reference.
+    pub fn of((file, spec, theirs): &(&str, SceneSpec, f64), samples: u32, by: usize) -> Option<Self> {
+        let full = read_exr(&reference_file(file)?).expect("reads");
+        let built = Scene::build(spec, Path::new("."), &Materials::new()).expect("builds");
+        let size = (full.width / by) as u32;
+        let options = Options { width: size, height: size, samples, seed: 7, ..Options::default() };
+        let film = render(&built, &options, Control::silent()).expect("renders");
+        Some(Self { film, full, by, samples, theirs: theirs * (by * by) as f64 })
+    }
+
+    /// Both with their noise.
+    pub fn with(&self, noise: Noise) -> Pair {
+        let reference = shrink(&self.full, self.by);
+        let (image, reference) = match noise {
+            Noise::Careful => {
+                let edges = variance_of_edges(&self.full, self.by);
+                with_noise(&self.film, &reference, &edges, f64::from(self.samples), self.theirs)
+            }
+            Noise::Own => with_own_noise(&self.film, &reference, self.theirs),
+        };
+        Pair { image, reference }
+    }
+}
+
+/// A picture and its reference with the noise of both.
 pub struct Pair {
     pub image: Image,
     pub reference: Image,
@@ -146,29 +181,6 @@ pub enum Noise {
 }
 
 impl Pair {
-    /// Renders the scene.
-    pub fn of(
-        (file, spec, reference_samples): &(&str, SceneSpec, f64),
-        samples: u32,
-        by: usize,
-        noise: Noise,
-    ) -> Option<Self> {
-        let full = read_exr(&reference_file(file)?).expect("reads");
-        let built = Scene::build(spec, Path::new("."), &Materials::new()).expect("builds");
-        let size = (full.width / by) as u32;
-        let options = Options { width: size, height: size, samples, seed: 7, ..Options::default() };
-        let film = render(&built, &options, Control::silent()).expect("renders");
-        let per_pixel = reference_samples * (by * by) as f64;
-        let (image, reference) = match noise {
-            Noise::Careful => {
-                let edges = variance_of_edges(&full, by);
-                with_noise(&film, &shrink(&full, by), &edges, f64::from(samples), per_pixel)
-            }
-            Noise::Own => with_own_noise(&film, &shrink(&full, by), per_pixel),
-        };
-        Some(Self { image, reference })
-    }
-
     /// Tests means over blocks of `blocks` × `blocks` pixels at 1 %.
     pub fn tested(&self, blocks: usize) -> Significance {
         let (image, reference) = (shrink(&self.image, blocks), shrink(&self.reference, blocks));

@@ -10,7 +10,7 @@ use super::occluders::{Occluders, Surroundings};
 use super::surround::Surround;
 
 /// Shapes and materials that a scene may have: every ray asks all of them.
-const MOST_SHAPES: usize = 48;
+pub(super) const MOST_SHAPES: usize = 48;
 const MOST_MATERIALS: usize = 16;
 /// Phong lobes of one material.
 pub(super) const MOST_LOBES: usize = 3;
@@ -100,7 +100,7 @@ impl<'a> FlatScene<'a> {
         }
         let materials: Vec<Lobes> = scene.materials.iter().map(lobes).collect::<Option<_>>()?;
         let Surroundings { spheres, pieces, surfaces, before_lights, before_environment } = surroundings;
-        if spheres.len() + pieces.len() > MOST_SHAPES || materials.len() > MOST_MATERIALS {
+        if materials.len() > MOST_MATERIALS {
             return None;
         }
         let spheres: Vec<_> = spheres.into_iter().map(|(sphere, owner)| (sphere, number(owner))).collect();

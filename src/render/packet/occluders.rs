@@ -6,7 +6,7 @@ use super::super::lights::Light;
 use super::super::material::Material;
 use super::super::scene::Scene;
 use super::super::shapes::{Owner, Plane, Quad, Sphere};
-use super::flat::Piece;
+use super::flat::{MOST_SHAPES, Piece};
 
 /// Shapes that may hide a light from a surface.
 #[derive(Debug, Clone, Default)]
@@ -29,9 +29,12 @@ pub(in crate::render) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Those of a scene; `None` of one with meshes.
+    /// Those of a scene; `None` of one with meshes, and of more than [`MOST_SHAPES`], each of which would be asked about all others.
     pub fn of(scene: &Scene) -> Option<Self> {
         let (spheres, planes, quads) = scene.geometry.analytic()?;
+        if scene.geometry.shapes() > MOST_SHAPES {
+            return None;
+        }
         let reflects = |owner: &Owner| match owner {
             Owner::Material(i) => !matches!(scene.materials[*i], Material::Black),
             Owner::Light { .. } => false,

@@ -32,6 +32,9 @@ pub(super) enum Read {
 /// Relative error that means over cones may have, and the only order of their rules where one is set.
 type Rules = (f64, Option<u32>);
 
+/// Places of both kinds of better readings.
+const FINE: usize = 0;
+const HIGH: usize = 1;
 /// Means over cones of the reference.
 const FINEST: f64 = 1e-10;
 /// Share of the full well below which a reading is taken.
@@ -58,10 +61,8 @@ pub(super) struct Bench<'a> {
     what: &'a SimulateSweep<'a>,
     seed: u64,
     control: Control<'a>,
-    /// Readings without noise to the finest accuracy, and the round that they are of: no other reads them.
-    finest: Option<(u32, Raw)>,
-    /// The same by rules of twice the highest order.
-    highest: Option<(u32, Raw)>,
+    /// Readings without noise to the finest accuracy, and by rules of twice the highest order, with the round that they are of: no other reads them.
+    better: [Option<(u32, Raw)>; 2],
     /// Readings of a round with all effects but noise, or with the one kind of noise that is looked at.
     whole: HashMap<Option<&'static str>, (u32, Judged)>,
     /// True values, by scan.
@@ -79,19 +80,19 @@ struct Judged {
 impl<'a> Bench<'a> {
     pub fn new(what: &'a SimulateSweep<'a>, seed: u64, control: Control<'a>) -> Self {
         let (whole, truths) = (HashMap::new(), HashMap::new());
-        Self { what, seed, control, finest: None, highest: None, whole, truths, quadrature_error: 0.0 }
+        Self { what, seed, control, better: [None, None], whole, truths, quadrature_error: 0.0 }
     }
 
     /// What the references are.
     pub fn said(&self) -> Vec<String> {
         let mut said = Vec::new();
-        if self.finest.is_some() {
+        if self.better[FINE].is_some() {
             said.push(format!(
                 "quadratures: the same readings with means over cones to {FINEST:.0e}; their last doubling moved them by {:.1e} at most",
                 self.quadrature_error
             ));
         }
-        if self.highest.is_some() {
+        if self.better[HIGH].is_some() {
             said.push(format!(
                 "orders: the same readings by rules of order {}: where errors fall by the square, they have a quarter of the last one's",
                 self.highest_order()
@@ -121,8 +122,11 @@ impl<'a> Bench<'a> {
 
     pub fn trial(&mut self, read: &Read, turn: Turn) -> Result<Trial, ChainError> {
         match read {
-            Read::Quadrature(accuracy) => self.quadrature(*accuracy, turn.round),
-            Read::Order(order) => self.order(*order, turn.round),
+            Read::Quadrature(accuracy) => self.means((*accuracy, None), (FINEST, None), turn.round),
+            Read::Order(order) => {
+                let better = (ACCURACY, Some(self.highest_order()));
+                self.means((ACCURACY, Some(*order)), better, turn.round)
+            }
             Read::Without(name) => self.without(*name, turn.round),
             Read::Noisy { instrument, scan } => self.noisy(instrument, scan, turn.seed),
         }
@@ -144,35 +148,26 @@ impl<'a> Bench<'a> {
         mix(self.seed ^ mix(u64::from(round)))
     }
 
-    fn quadrature(&mut self, accuracy: f64, round: u32) -> Result<Trial, ChainError> {
+    /// Readings by rules against those by better ones, which are made once a round.
+    fn means(&mut self, rules: Rules, better: Rules, round: u32) -> Result<Trial, ChainError> {
         let seed = self.instrument_of(round);
-        self.finest.take_if(|(of, _)| *of != round);
-        if self.finest.is_none() {
-            let (raw, _) = self.read((FINEST, None), &NOISE, seed)?;
-            self.quadrature_error = self.quadrature_error.max(raw.quadrature_error);
-            self.finest = Some((round, raw));
+        let kind = if better.1.is_some() { HIGH } else { FINE };
+        let known = self.better[kind].take().filter(|(of, _)| *of == round);
+        let reference = match known {
+            Some(known) => known,
+            None => (round, self.read(better, &NOISE, seed)?.0),
+        };
+        let (raw, seconds) = self.read(rules, &NOISE, seed)?;
+        let error = of_samples(&raw, &reference.1);
+        if kind == FINE {
+            self.quadrature_error = self.quadrature_error.max(reference.1.quadrature_error);
         }
-        let (raw, seconds) = self.read((accuracy, None), &NOISE, seed)?;
-        let error = self.finest.as_ref().map_or(f64::NAN, |(_, finest)| of_samples(&raw, finest));
+        self.better[kind] = Some(reference);
         Ok(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN] })
     }
 
     fn highest_order(&self) -> u32 {
         2 * self.what.orders.iter().copied().max().unwrap_or(1)
-    }
-
-    fn order(&mut self, order: u32, round: u32) -> Result<Trial, ChainError> {
-        let seed = self.instrument_of(round);
-        let known = self.highest.take().filter(|(of, _)| *of == round);
-        let by = |order: u32| self.read((ACCURACY, Some(order)), &NOISE, seed);
-        let (raw, seconds) = by(order)?;
-        let reference = match known {
-            Some(known) => known,
-            None => (round, by(self.highest_order())?.0),
-        };
-        let error = of_samples(&raw, &reference.1);
-        self.highest = Some(reference);
-        Ok(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN] })
     }
 
     fn without(&mut self, name: Option<&'static str>, round: u32) -> Result<Trial, ChainError> {
@@ -311,7 +306,7 @@ mod tests {
             let reads = [Read::Quadrature(1e-3), Read::Without(None), Read::Without(Some("shot noise"))];
             let errors = reads.map(|read| bench.trial(&read, turn).expect("reads").errors[0]);
             let rounds: Vec<u32> = bench.whole.values().map(|(of, _)| *of).collect();
-            let kept = (bench.finest.as_ref().map(|(of, _)| *of), rounds);
+            let kept = (bench.better[FINE].as_ref().map(|(of, _)| *of), rounds);
             assert_eq!(kept, (Some(round), vec![round; 2]), "one of all effects, one with the noise that is looked at");
             errors.map(f64::to_bits)
         };
