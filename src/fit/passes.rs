@@ -67,7 +67,9 @@ impl Scratch {
     /// Fills the columns with the lobes as the samples of a block see them.
     pub fn basis(&mut self, samples: &Samples<'_>, block: &Block, lobes: &[ShapedLobe]) {
         let Some(sight) = &samples.sight else { return self.bare_basis(&block.x, lobes) };
-        self.fill(block.len(), lobes, |lobe, phi, own| sight.fill(lobe.kind, &lobe.shape, &block.places, phi, own));
+        self.fill(block.len(), lobes, |lobe, phi, own| {
+            samples.shown.fill(&**sight, (lobe.kind, &lobe.shape), block, phi, own);
+        });
     }
 
     /// Fills the columns, lists of this length: values of each lobe and their derivatives by `of`.

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::block::{Block, neighbours, next_on_line};
 use super::select::{Judge, Left, Thin, least_cos};
+use super::shown::Shown;
 use super::{PIECES, Samples, Source, Transforms, piece};
 use crate::brdf::{LobeKind, ModelSpec};
 use crate::fit::bins::Bins;
@@ -46,6 +47,7 @@ impl<'a> Samples<'a> {
             channels: channels.to_vec(),
             source: Source::Listed(Block::default()),
             sight: options.through.clone(),
+            shown: Shown::default(),
             loss: options.loss,
             count: 0,
             lists: channels.len(),

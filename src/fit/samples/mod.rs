@@ -5,6 +5,7 @@
 mod block;
 mod gather;
 mod select;
+mod shown;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 pub(in crate::fit) use block::Block;
 use block::Values;
 pub(in crate::fit) use select::{Thin, least_cos, offset};
+use shown::Shown;
 
 use super::loss::Loss;
 use super::merl_lines::{self, Line, MerlLines};
@@ -42,8 +44,9 @@ pub(in crate::fit) struct Samples<'a> {
     /// The measurement's channels that are fitted.
     pub channels: Vec<usize>,
     source: Source,
-    /// What lobes are seen through.
+    /// What lobes are seen through, and what it showed.
     pub sight: Option<Arc<dyn Sight>>,
+    pub shown: Shown,
     /// The loss they were prepared for.
     pub loss: Loss,
     /// Directions that count.
@@ -294,6 +297,7 @@ impl Samples<'_> {
             measurement: self.measurement,
             channels: self.channels.clone(),
             sight: self.sight.clone(),
+            shown: Shown::default(),
             loss: self.loss,
             count: all.len(),
             lists: self.lists,
