@@ -26,6 +26,7 @@ mod ray;
 pub mod scene;
 mod schedule;
 mod shapes;
+mod surroundings;
 mod tiles;
 
 pub use error::RenderError;

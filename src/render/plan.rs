@@ -2,8 +2,9 @@
 
 use super::lights::Environment;
 use super::material::Material;
-use super::packet::{FlatScene, MOST_CLOSED, Surroundings};
+use super::packet::{FlatScene, MOST_CLOSED};
 use super::scene::Scene;
+use super::surroundings::Surroundings;
 use crate::control::{self, counted};
 
 /// What is computed for a scene. What is off is proved not to matter: the picture is that of [`Plan::FULL`].

@@ -5,43 +5,16 @@ use glam::DVec3;
 use super::super::lights::{Environment, Light, QuadLight};
 use super::super::material::Material;
 use super::super::scene::Scene;
-use super::super::shapes::{Owner, Plane, Quad, Sphere};
-use super::occluders::{Occluders, Surroundings};
+use super::super::shapes::{Owner, Piece, Sphere};
+use super::super::surroundings::{Occluders, Surroundings};
 use super::surround::Surround;
 
-/// Shapes and materials that a scene may have: every ray asks all of them.
-pub(super) const MOST_SHAPES: usize = 48;
+/// Materials that a scene may have: every ray asks all of them, as it asks all shapes.
 const MOST_MATERIALS: usize = 16;
 /// Phong lobes of one material.
 pub(super) const MOST_LOBES: usize = 3;
 /// Up to this exponent a Phong lobe's light of a quad that nothing can hide is integrated: sharper lobes find it more cheaply by their own samples.
 pub(in crate::render) const MOST_CLOSED: f64 = 1000.0;
-
-/// A plane, or the piece of it with |a|, |b| ≤ 1 where the coordinates of p are `to_a`·(p − point), `to_b`·(p − point).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Piece {
-    pub point: DVec3,
-    pub normal: DVec3,
-    pub to_a: DVec3,
-    pub to_b: DVec3,
-    /// The largest coordinate of its own, m: what a computed point on it is off by grows with that.
-    pub reach: f64,
-}
-
-impl Piece {
-    /// All of a plane.
-    pub fn of_plane(plane: &Plane) -> Self {
-        let reach = plane.point.abs().max_element();
-        Self { point: plane.point, normal: plane.normal, to_a: DVec3::ZERO, to_b: DVec3::ZERO, reach }
-    }
-
-    /// A quad.
-    pub fn of_quad(quad: &Quad) -> Self {
-        let (to_a, to_b) = quad.dual();
-        let reach = (quad.center.abs() + quad.u.abs() + quad.v.abs()).max_element();
-        Self { point: quad.center, normal: quad.normal, to_a, to_b, reach }
-    }
-}
 
 /// Whose a shape is: a material's index, or −1 less a light's.
 pub(super) type OwnerNumber = f64;

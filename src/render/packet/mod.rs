@@ -7,7 +7,6 @@
 mod flat;
 mod lights;
 mod lobes;
-mod occluders;
 mod outline;
 mod path;
 mod shapes;
@@ -16,5 +15,4 @@ mod surround;
 mod wave;
 
 pub(super) use flat::{FlatScene, MOST_CLOSED};
-pub(super) use occluders::Surroundings;
 pub(super) use path::Packets;

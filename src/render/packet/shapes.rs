@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::super::ray::gamma;
-use super::super::shapes::Sphere;
-use super::flat::{FlatScene, Piece};
-use super::occluders::Occluders;
+use super::super::shapes::{Piece, Sphere};
+use super::super::surroundings::Occluders;
+use super::flat::FlatScene;
 use crate::numeric::lanes::{Lanes, Mask, Vec3};
 use crate::numeric::simd::Simd;
 

@@ -3,6 +3,7 @@
 mod geometry;
 mod instances;
 mod mesh;
+mod piece;
 mod plane;
 mod quad;
 mod sphere;
@@ -12,6 +13,7 @@ mod triangles;
 pub use geometry::{Geometry, Owner, Surface};
 pub use instances::Placement;
 pub use mesh::{Mesh, read_mesh};
+pub use piece::Piece;
 pub use plane::Plane;
 pub use quad::Quad;
 pub use sphere::Sphere;

@@ -2,11 +2,13 @@
 
 use glam::DVec3;
 
-use super::super::lights::Light;
-use super::super::material::Material;
-use super::super::scene::Scene;
-use super::super::shapes::{Owner, Plane, Quad, Sphere};
-use super::flat::{MOST_SHAPES, Piece};
+use super::lights::Light;
+use super::material::Material;
+use super::scene::Scene;
+use super::shapes::{Owner, Piece, Plane, Quad, Sphere};
+
+/// Shapes that a scene may have: each would be asked about all others, and a packet's rays ask all of them.
+const MOST_SHAPES: usize = 48;
 
 /// Shapes that may hide a light from a surface.
 #[derive(Debug, Clone, Default)]
@@ -17,7 +19,7 @@ pub(super) struct Occluders {
 
 /// A scene of spheres, planes and quads: what reflects, and what may stand in the way.
 #[derive(Debug)]
-pub(in crate::render) struct Surroundings {
+pub(super) struct Surroundings {
     pub(super) spheres: Vec<(Sphere, Owner)>,
     pub(super) pieces: Vec<(Piece, Owner)>,
     /// How many of the shapes reflect.
@@ -29,7 +31,7 @@ pub(in crate::render) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Those of a scene; `None` of one with meshes, and of more than [`MOST_SHAPES`], each of which would be asked about all others.
+    /// Those of a scene; `None` of one with meshes, and of more than [`MOST_SHAPES`].
     pub fn of(scene: &Scene) -> Option<Self> {
         let (spheres, planes, quads) = scene.geometry.analytic()?;
         if scene.geometry.shapes() > MOST_SHAPES {
@@ -71,7 +73,7 @@ impl Surroundings {
 
 /// How far a shape reaches, for signed distances from planes.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Extent {
+enum Extent {
     Ball(Sphere),
     Corners([DVec3; 4]),
     Endless(Plane),
@@ -147,7 +149,7 @@ fn may_hide(piece: &Piece, surfaces: &[Extent], light: &Light) -> bool {
 
 impl Occluders {
     /// Those of a light, out of all shapes of a scene; `surfaces` are those that reflect.
-    pub fn of(light: &Light, all: &Self, surfaces: &[Extent]) -> Self {
+    fn of(light: &Light, all: &Self, surfaces: &[Extent]) -> Self {
         let pieces = all.pieces.iter().filter(|piece| may_hide(piece, surfaces, light)).copied().collect();
         // A ball hides nothing from the points of its own that face the light, and a shining one nothing of itself.
         let shines = |ball: &Sphere| matches!(light, Light::Sphere(own) if own.sphere == *ball);
