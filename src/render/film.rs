@@ -407,6 +407,7 @@ impl Painter<'_> {
         mut gather: impl FnMut(usize, &W, &PathResult),
     ) -> Counts {
         let mut counts = Counts::default();
+        let follow = self.tracer.follow::<W>();
         for slot in tile.slots() {
             let (x, y) = (tile.x + slot % TILE, tile.y + slot / TILE);
             let keys = keys_of(self.seed, x as u32, y as u32);
@@ -414,7 +415,7 @@ impl Painter<'_> {
                 let draws = Draws::new(keys, sample);
                 let ray = self.camera.ray(x, y, draws);
                 let mut watch = W::default();
-                let path = self.tracer.trace(ray, draws, &mut watch);
+                let path = follow(&self.tracer, ray, draws, &mut watch);
                 debug_assert!(path.radiance.is_finite(), "pixel ({x}, {y}): radiance {}", path.radiance);
                 counts.add(&path);
                 pixels[slot].add(&path);

@@ -95,10 +95,14 @@ struct Vertex {
 pub struct Tracer<'a> {
     scene: &'a Scene,
     strategy: Strategy,
-    plan: Plan,
+    shadows: bool,
+    chance: bool,
     /// Scattering events of a path at most.
     events: u32,
 }
+
+/// Follows one path that starts with a ray at the camera.
+pub type Follow<'a, W> = fn(&Tracer<'a>, Ray, Draws, &mut W) -> PathResult;
 
 struct Path {
     radiance: DVec3,
@@ -118,11 +122,25 @@ impl<'a> Tracer<'a> {
     /// A tracer for a scene, by a plan.
     pub fn new(scene: &'a Scene, strategy: Strategy, plan: Plan) -> Self {
         let chance = plan.chance && strategy != Strategy::LightsOnly;
-        Self { scene, strategy, plan: Plan { chance, ..plan }, events: plan.events(scene.max_bounces) }
+        Self { scene, strategy, shadows: plan.shadows, chance, events: plan.events(scene.max_bounces) }
     }
 
-    /// Follows one path that starts with `ray` at the camera.
-    pub fn trace(&self, mut ray: Ray, draws: Draws, watch: &mut impl Watch) -> PathResult {
+    /// What follows paths by the plan: one function for each, in which there is nothing of what is off. To be asked once, not for every path.
+    pub fn follow<W: Watch>(&self) -> Follow<'a, W> {
+        match (self.shadows, self.chance) {
+            (true, true) => Self::trace::<true, true, W>,
+            (true, false) => Self::trace::<true, false, W>,
+            (false, true) => Self::trace::<false, true, W>,
+            (false, false) => Self::trace::<false, false, W>,
+        }
+    }
+
+    fn trace<const SHADOWS: bool, const CHANCE: bool, W: Watch>(
+        &self,
+        mut ray: Ray,
+        draws: Draws,
+        watch: &mut W,
+    ) -> PathResult {
         let mut path = Path { radiance: DVec3::ZERO, throughput: DVec3::ONE, unknown: 0.0, rays: 0 };
         let mut last: Option<Scatter> = None;
         for bounce in 0..=self.events {
@@ -161,7 +179,8 @@ impl<'a> Tracer<'a> {
                 // What the lights send to the second surface will have scattered there and at the first.
                 watch.indirect_begins(path.radiance);
             }
-            let Some(next) = self.scatter(material, &vertex, bounce, &mut path, (draws, watch)) else { break };
+            let next = self.scatter::<SHADOWS, CHANCE>(material, &vertex, bounce, &mut path, (draws, watch));
+            let Some(next) = next else { break };
             ray = Ray::new(vertex.point.above(), next.0);
             last = Some(next.1);
         }
@@ -174,9 +193,9 @@ impl<'a> Tracer<'a> {
     }
 
     /// Whether something lies on a segment towards a light.
-    fn hides(&self, segment: &Ray, path: &mut Path) -> bool {
-        path.rays += u32::from(self.plan.shadows);
-        self.plan.shadows && self.scene.geometry.occluded(segment)
+    fn hides<const SHADOWS: bool>(&self, segment: &Ray, path: &mut Path) -> bool {
+        path.rays += u32::from(SHADOWS);
+        SHADOWS && self.scene.geometry.occluded(segment)
     }
 
     fn material_of(&self, surface: &Surface) -> Option<&'a Material> {
@@ -187,7 +206,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Adds the light that arrives at the vertex directly and draws where the path goes on; `None` where it ends.
-    fn scatter(
+    fn scatter<const SHADOWS: bool, const CHANCE: bool>(
         &self,
         material: &Material,
         vertex: &Vertex,
@@ -198,14 +217,14 @@ impl<'a> Tracer<'a> {
         let brdf = match material {
             Material::Black => return None,
             Material::PhongEquation(equation) => {
-                let shaded = self.shade(equation, vertex, path);
+                let shaded = self.shade::<SHADOWS>(equation, vertex, path);
                 path.radiance += path.throughput * shaded;
                 return None;
             }
             Material::Brdf(brdf) => brdf.as_ref(),
         };
-        self.add_direct(brdf, vertex, bounce, path, (draws, watch));
-        if bounce + 1 == self.events && !self.plan.chance {
+        self.add_direct::<SHADOWS>(brdf, vertex, bounce, path, (draws, watch));
+        if bounce + 1 == self.events && !CHANCE {
             return None;
         }
         let drawn = brdf.sample(vertex.wo, self.draws_at(draws, bounce, Decision::Direction).direction())?;
@@ -227,7 +246,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Light found by aiming at the lights.
-    fn add_direct(
+    fn add_direct<const SHADOWS: bool>(
         &self,
         brdf: &dyn Brdf,
         vertex: &Vertex,
@@ -237,7 +256,7 @@ impl<'a> Tracer<'a> {
     ) {
         let mut add = |aim: Arrival| {
             let before = path.radiance;
-            self.add_unhidden(brdf, vertex, &aim, path);
+            self.add_unhidden::<SHADOWS>(brdf, vertex, &aim, path);
             if bounce == 0 {
                 let wi = vertex.frame.to_local(aim.wi);
                 watch.first_reflects(brdf, (wi, vertex.wo), path.radiance - before);
@@ -267,10 +286,10 @@ impl<'a> Tracer<'a> {
     }
 
     /// Adds what is reflected of the irradiance that arrives from where the path aimed, where nothing is in its way.
-    fn add_unhidden(&self, brdf: &dyn Brdf, vertex: &Vertex, aim: &Arrival, path: &mut Path) {
+    fn add_unhidden<const SHADOWS: bool>(&self, brdf: &dyn Brdf, vertex: &Vertex, aim: &Arrival, path: &mut Path) {
         let reflected = self.reflected(brdf, vertex, aim.wi, aim.pdf);
         let matters = aim.irradiance != DVec3::ZERO && reflected != Some(DVec3::ZERO);
-        if !matters || self.hides(&aim.shadow, path) {
+        if !matters || self.hides::<SHADOWS>(&aim.shadow, path) {
             return;
         }
         match reflected {
@@ -316,13 +335,13 @@ impl<'a> Tracer<'a> {
     }
 
     /// Phong's equation at the vertex.
-    fn shade(&self, equation: &PhongEquation, vertex: &Vertex, path: &mut Path) -> DVec3 {
+    fn shade<const SHADOWS: bool>(&self, equation: &PhongEquation, vertex: &Vertex, path: &mut Path) -> DVec3 {
         let mut radiance = equation.ambient;
         for light in &self.scene.lights {
             let Some(segment) = light.as_seen_by_equation(&vertex.point) else { continue };
             let term = equation.light_term(vertex.frame.to_local(segment.direction), vertex.wo);
             let above = vertex.point.normal.dot(segment.direction) > 0.0;
-            if above && term != DVec3::ZERO && !self.hides(&segment, path) {
+            if above && term != DVec3::ZERO && !self.hides::<SHADOWS>(&segment, path) {
                 radiance += term;
             }
         }
