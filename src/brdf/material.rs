@@ -223,12 +223,11 @@ impl Reflectance {
         Self::new(diffuse, phong.into_iter().enumerate().map(term).collect())
     }
 
-    /// Probability of drawing from the diffuse lobe for an eye at cosθo = `cos`, and by what the shares of glossy ones are to be multiplied, before
-    /// [`phong::seen`].
-    fn drawn(&self, cos: f64) -> (f64, f64) {
-        let glossy = self.glossy.iter().zip(&self.share[1..]).map(|(t, s)| s * phong::seen(t.exponent, cos));
-        let scale = 1.0 / (self.share[0] + glossy.sum::<f64>());
-        (self.share[0] * scale, scale)
+    /// What lobes are drawn in proportion to for an eye at cosθo = `cos`: the Lambert lobe (`None`), then the Phong lobes.
+    fn chances(&self, cos: f64) -> impl Iterator<Item = (Option<&GlossyTerm>, f64)> {
+        let glossy = self.glossy.iter().zip(&self.share[1..]);
+        let glossy = glossy.map(move |(term, share)| (Some(term), share * phong::seen(term.exponent, cos)));
+        std::iter::once((None, self.share[0])).chain(glossy)
     }
 
     /// The Lambert lobe's weights and its share; of each Phong lobe weights, exponent and share. Shares add up to 1; lobes are drawn in proportion to them, those
@@ -292,14 +291,14 @@ impl Brdf for Reflectance {
             return None;
         }
         let point = DVec2::new(u[1], u[2]);
-        let (diffuse, scale) = self.drawn(wo.z);
-        let mut rest = u[0] - diffuse;
+        let mut rest = u[0] * self.chances(wo.z).map(|(_, chance)| chance).sum::<f64>();
         let mut chosen = None;
-        for (term, share) in self.glossy.iter().zip(&self.share[1..]) {
-            if rest < 0.0 {
+        for (term, chance) in self.chances(wo.z) {
+            chosen = term;
+            if rest < chance {
                 break;
             }
-            (chosen, rest) = (Some(term), rest - scale * share * phong::seen(term.exponent, wo.z));
+            rest -= chance;
         }
         let wi = match chosen {
             None => cosine_hemisphere(point),
@@ -313,11 +312,13 @@ impl Brdf for Reflectance {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return 0.0;
         }
-        let (diffuse, scale) = self.drawn(wo.z);
-        let of =
-            |(t, s): (&GlossyTerm, &f64)| s * phong::seen(t.exponent, wo.z) * phong::sampling_pdf(t.exponent, wi, wo);
-        let glossy = self.glossy.iter().zip(&self.share[1..]).map(of);
-        diffuse * cosine_hemisphere_pdf(wi) + scale * glossy.sum::<f64>()
+        let (mut all, mut drawn) = (0.0, 0.0);
+        self.chances(wo.z).for_each(|(term, chance)| {
+            all += chance;
+            drawn +=
+                chance * term.map_or_else(|| cosine_hemisphere_pdf(wi), |t| phong::sampling_pdf(t.exponent, wi, wo));
+        });
+        drawn / all
     }
 }
 
