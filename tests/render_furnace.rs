@@ -10,10 +10,11 @@ use std::sync::Arc;
 use furnace_support::{Case, THETAS_DEG, models, rendered};
 use glam::DVec3;
 use goniofit::brdf::{Brdf, Reflectance};
+use goniofit::geometry::angles::direction_deg;
 use goniofit::geometry::mirror;
 use goniofit::numeric::stats::{normal_quantile, sidak};
 use goniofit::render::Material;
-use table_support::{TENS, lobe, merl_of, scan, table};
+use table_support::{TENS, grey, lobe, merl_of, scan, scan_without_retro, table};
 
 const SAMPLES: u32 = 1 << 17;
 
@@ -68,6 +69,21 @@ fn hard_case_tables_in_a_white_furnace_show_their_albedo() {
         ("retro scan", table(&scan(&[15.0, 30.0, 60.0], retro))),
     ];
     check(&tables.map(|(name, brdf)| Case::brdf(name, Arc::new(brdf))));
+}
+
+/// What nobody measured reflects nothing, in the picture and in the albedo alike.
+#[test]
+fn hard_case_a_table_without_its_retro_zone_in_a_white_furnace_shows_the_albedo_of_what_was_measured() {
+    let gloss = |i: DVec3, o: DVec3| 0.1 + 3.0 * (-(o - mirror(i)).length_squared() / 0.02).exp();
+    let brdf = table(&scan_without_retro(17.0, gloss));
+    for theta in THETAS_DEG {
+        let eye = direction_deg(theta, 0.0);
+        let covered = brdf.directional_albedo(eye).covered;
+        println!("θ {theta:4}°: {:.2} % of the light comes from where nothing is known", 100.0 * (1.0 - covered));
+        // Far from the normal the zone is half below the horizon, and the rest of it counts with a small cosine.
+        assert!(grey(&brdf, eye, eye).is_none() && (0.8..0.999).contains(&covered), "θ {theta}°: {covered}");
+    }
+    check(&[Case::brdf("scan, no retro", Arc::new(brdf))]);
 }
 
 #[test]

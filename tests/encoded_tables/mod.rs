@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use goniofit::measurement::{MerlAngles, MerlGrid};
+use goniofit::measurement::{Measurement, MerlAngles, MerlGrid, ReadOptions, formats};
 use rayon::prelude::*;
 
 /// A file beside the project; says that it is skipped where it is not there.
@@ -17,6 +17,16 @@ pub fn shared(path: &str) -> Option<PathBuf> {
     }
     println!("SKIPPED: {} is not here", full.display());
     None
+}
+
+/// An encoded table by its name, if it is there.
+pub fn encoded(name: &str) -> Option<Measurement> {
+    shared(&format!("data/merl-encoded/{name}.npz")).map(|file| expanded(&file))
+}
+
+/// The table that an encoded file stands for.
+pub fn expanded(file: &Path) -> Measurement {
+    formats::read_bytes(&file.with_extension("binary"), decode(file), &ReadOptions::default()).expect("a table")
 }
 
 /// A matrix of an `.npz` archive, row-major.

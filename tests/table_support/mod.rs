@@ -61,6 +61,17 @@ pub fn list(wi: Vec<DVec3>, wo: Vec<DVec3>, f: impl Fn(DVec3, DVec3) -> f64) -> 
     Measurement::new("scan", Directions::List { wi, wo }, vec!["grey".into()], values)
 }
 
+/// A scan as far as the horizon, incidences and outgoing directions every 5° up to 85°, then 88° and 89.95°, in which the retro zone is missing: pairs whose
+/// directions are less than `missing_deg` apart have no value, as where the detector would stand in the beam.
+pub fn scan_without_retro(missing_deg: f64, f: impl Fn(DVec3, DVec3) -> f64) -> Measurement {
+    let thetas = || (0..=17).map(|ring| 5.0 * f64::from(ring)).chain([88.0, 89.95]);
+    let around = |theta_o: f64| (0..=18).map(move |step| direction_deg(theta_o, 10.0 * f64::from(step)));
+    let of = |theta_i: f64| thetas().flat_map(around).map(move |wo| (direction_deg(theta_i, 0.0), wo));
+    let (wi, wo): (Vec<DVec3>, Vec<DVec3>) = thetas().flat_map(of).unzip();
+    let nearest = missing_deg.to_radians().cos();
+    list(wi, wo, |i, o| if i.dot(o) > nearest { f64::NAN } else { f(i, o) })
+}
+
 pub const TENS: [f64; 9] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
 
 pub fn table(measurement: &Measurement) -> TableBrdf {
