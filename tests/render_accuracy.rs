@@ -5,10 +5,12 @@
 mod common;
 
 use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use common::{picture, scene};
-use goniofit::control::Control;
+use goniofit::control::{Control, Progress, Stop};
 use goniofit::render::scene::builtin;
 use goniofit::render::{Film, Materials, Options, Scene, render};
 
@@ -66,6 +68,80 @@ fn a_target_out_of_reach_ends_at_the_most_samples() {
     let film = render(&built("cornell"), &options, Control::silent()).expect("renders");
     assert_eq!((film.samples(), film.total_samples()), (40, 40 * 64));
     assert!(film.error().expect("samples enough").at_most > 1e-6);
+}
+
+/// Notes what is told, once for a number of samples, with that, and asks to stop where it has grown by a factor since the first.
+struct Listener {
+    samples: AtomicU64,
+    told: Mutex<Vec<(u64, String)>>,
+    growth: u64,
+    stop: Stop,
+}
+
+impl Listener {
+    fn new(growth: u64) -> Self {
+        Self { samples: AtomicU64::new(0), told: Mutex::default(), growth, stop: Stop::new() }
+    }
+
+    /// The errors told, in per cent as they are printed, with the samples of all tiles by then.
+    fn errors(&self) -> Vec<(f64, f64)> {
+        let number = |text: &str| text.strip_prefix("error ")?.strip_suffix(" %")?.parse().ok();
+        let told = self.told.lock().expect("no thread failed");
+        told.iter().map(|(n, text)| (*n as f64, number(text).unwrap_or_else(|| panic!("told: {text}")))).collect()
+    }
+}
+
+impl Progress for Listener {
+    fn start(&self, _label: &str, _total: u64) {}
+    fn advance(&self, steps: u64) {
+        self.samples.fetch_add(steps, Ordering::Relaxed);
+    }
+    fn tell(&self, state: &str) {
+        let samples = self.samples.load(Ordering::Relaxed);
+        let mut told = self.told.lock().expect("no thread failed");
+        if !state.is_empty() && told.last().is_none_or(|(last, _)| *last < samples) {
+            told.push((samples, state.to_owned()));
+        }
+        if told.first().is_some_and(|(first, _)| samples / self.growth >= *first) {
+            self.stop.request();
+        }
+    }
+    fn finish(&self) {}
+}
+
+/// What is told falls as samples come in, and the last is what the picture states of itself, to half a unit of the last digit.
+fn told_well(film: &Film, told: &[(f64, f64)]) {
+    let stated = 100.0 * film.to_image().metadata.relative_error.expect("samples enough")[0];
+    println!("told {told:?}, stated {stated} %");
+    let [first, .., last] = told else { panic!("told once at most: {told:?}") };
+    assert!((last.1 - stated).abs() <= 0.005 + 1e-9, "told {} %, stated {stated} %", last.1);
+    // By thousands of values: more samples of the same pixels hardly raise it but for a path that is rare.
+    assert!(told.windows(2).all(|pair| pair[1].1 <= 1.05 * pair[0].1), "{told:?}");
+    // Four times the samples halve it; two fifths more is for what both are known to, and for rare paths.
+    assert!(last.0 >= 4.0 * first.0 && last.1 <= 0.7 * first.1, "{told:?}");
+}
+
+#[test]
+fn the_error_is_told_at_each_look_at_a_target() {
+    let listener = Listener::new(u64::MAX);
+    let options = Options { width: 32, height: 32, samples: 1 << 16, target_error: Some(0.02), ..Options::default() };
+    let control = Control { progress: &listener, stop: &listener.stop };
+    let film = render(&built("cornell"), &options, control).expect("options are in range");
+    assert!(!listener.stop.requested());
+    told_well(&film, &listener.errors());
+}
+
+/// A number of samples asks for no look: the error is told once a second, to whoever listens.
+#[test]
+fn the_error_is_told_while_a_number_of_samples_is_taken() {
+    let listener = Listener::new(4);
+    let options = Options { width: 64, height: 64, samples: 1 << 20, ..Options::default() };
+    let control = Control { progress: &listener, stop: &listener.stop };
+    let start = Instant::now();
+    let film = render(&built("cornell"), &options, control).expect("options are in range");
+    let told = listener.errors();
+    assert!(listener.stop.requested() && told.len() as f64 <= start.elapsed().as_secs_f64(), "{told:?}");
+    told_well(&film, &told);
 }
 
 #[test]

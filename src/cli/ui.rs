@@ -263,6 +263,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_told_is_shown_on_the_bar_or_in_the_lines() {
+        let bar = Bar::new(false);
+        bar.start("render", 10);
+        for state in ["error 2.31 %", "error 1.16 %"] {
+            bar.tell(state);
+            // Whether the tests' stderr is a terminal decides which.
+            let on_bar = bar.bar().as_ref().map(ProgressBar::prefix);
+            let in_lines = bar.plain().as_ref().map(|plain| plain.state.clone());
+            assert_eq!(on_bar.or(in_lines).as_deref(), Some(state));
+        }
+        bar.finish();
+        assert!(bar.bar().is_none() && bar.plain().is_none());
+    }
+
+    #[test]
     fn without_a_terminal_progress_is_a_line_now_and_then() {
         let start = Instant::now();
         let mut plain =
