@@ -4,7 +4,8 @@
 mod convergence_support;
 mod encoded_tables;
 
-use convergence_support::{encoded, noise, pair};
+use convergence_support::{noise, pair};
+use encoded_tables::encoded;
 
 #[test]
 fn a_measured_table_converges_as_fast_as_its_fit_within_a_factor_of_2() {

@@ -7,11 +7,9 @@ use std::sync::Arc;
 use goniofit::control::Control;
 use goniofit::fit::{FitOptions, fit};
 use goniofit::image::{Image, compare};
-use goniofit::measurement::{Measurement, ReadOptions, TableBrdf, formats};
+use goniofit::measurement::{Measurement, TableBrdf};
 use goniofit::render::scene::builtin;
-use goniofit::render::{Material, Materials, Options, Scene, render};
-
-use crate::encoded_tables::{decode, shared};
+use goniofit::render::{Material, Materials, Options, Plan, Scene, render};
 
 /// A table and its fit, ready to be rendered.
 pub struct Pair {
@@ -19,13 +17,6 @@ pub struct Pair {
     pub fit: Material,
     /// Exponent of the fit.
     pub exponent: f64,
-}
-
-/// An encoded table by its name, if it is there.
-pub fn encoded(name: &str) -> Option<Measurement> {
-    let file = shared(&format!("data/merl-encoded/{name}.npz"))?;
-    let bytes = decode(&file);
-    Some(formats::read_bytes(&file.with_extension("binary"), bytes, &ReadOptions::default()).expect("a table"))
 }
 
 /// The table as it is and as `lambert+phong`.
@@ -40,25 +31,42 @@ pub fn pair(table: &Measurement) -> Pair {
 }
 
 /// Noise of a picture per sample, relative as relMSE is: of the samples as if they were independent, and what two pictures of
-/// different seeds differ by.
+/// different seeds differ by. And the time that a picture takes, s: of the quicker one of the two.
 #[derive(Debug, Clone, Copy)]
 pub struct Noise {
     pub of_samples: f64,
     pub of_pictures: f64,
+    pub seconds: f64,
 }
 
-/// The noise of a built-in scene with this subject.
+impl Noise {
+    /// What the time to a given relMSE is in proportion to, where that falls with the number of samples.
+    pub fn in_time(&self) -> f64 {
+        self.of_pictures * self.seconds
+    }
+}
+
+/// The noise of a built-in scene with this subject, by the plan of the scene.
 pub fn noise(scene: &str, subject: &Material, size: u32, samples: u32) -> Noise {
+    noise_by(scene, subject, size, samples, true)
+}
+
+/// The same, packets left out unless `packets` says that they may be.
+pub fn noise_by(scene: &str, subject: &Material, size: u32, samples: u32, packets: bool) -> Noise {
     let spec = builtin(scene).expect("built in");
     let name = spec.subject.clone().expect("a subject");
     let built = Scene::build(&spec, Path::new("."), &Materials::from([(name, subject.clone())])).expect("builds");
+    let plan = Plan::of(&built);
+    let plan = Some(Plan { packets: plan.packets && packets, ..plan });
     let shot = |seed| {
-        let options = Options { width: size, height: size, samples, seed, ..Options::default() };
+        let options = Options { width: size, height: size, samples, seed, plan, ..Options::default() };
         render(&built, &options, Control::silent()).expect("renders").to_image()
     };
     let (a, b) = (shot(1), shot(2));
     let between = compare(&a, &b).expect("of one size").rel_mse;
+    let seconds = [&a, &b].map(|image| image.metadata.seconds.expect("rendered"));
     Noise {
+        seconds: seconds[0].min(seconds[1]),
         of_samples: 0.5 * (relative_variance(&a) + relative_variance(&b)) * f64::from(samples),
         of_pictures: 0.5 * between * f64::from(samples),
     }
