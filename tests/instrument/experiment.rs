@@ -9,6 +9,7 @@ use goniofit::chain;
 use goniofit::control::Control;
 use goniofit::fit::{FitOptions, fit};
 use goniofit::geometry::angles::direction_deg;
+use goniofit::gonio::parts::Protocol;
 use goniofit::gonio::sight::Cones;
 use goniofit::gonio::{Instrument, Job, Preset, Raw, Reduction, SimulationSpec};
 use goniofit::measurement::{Directions, Measurement, Weights};
@@ -17,14 +18,25 @@ use rayon::prelude::*;
 
 /// kd, ks and n of the classes of materials; a matte one has no lobe.
 pub const CLASSES: [(&str, [f64; 3]); 3] =
-    [("matte", [0.8, 0.0, 1.0]), ("glossy", [0.2, 0.1, 60.0]), ("mirror-like", [0.05, 0.5, 2e4])];
+    [("matte", [0.8, 0.0, 1.0]), ("glossy", GLOSSY), ("mirror-like", [0.05, 0.5, 2e4])];
+const GLOSSY: [f64; 3] = [0.2, 0.1, 60.0];
+
+/// A name, and what it makes of a built-in instrument's.
+pub type Study = (&'static str, fn(&str) -> Experiment);
+
+/// What else is redrawn.
+pub const STUDIES: [Study; 3] =
+    [("out-of-plane", Experiment::out_of_plane), ("misfit", Experiment::misfit), ("visits", Experiment::visits)];
 
 /// A material on the holder of an instrument.
 pub struct Experiment {
     /// What a user describes.
     pub described: Instrument,
-    pub truth: [f64; 3],
+    /// kd, ks and n that fits are to find; `None` where the material is none of the fitted model, of which no parameter is right.
+    pub truth: Option<[f64; 3]>,
     pub directions: Directions,
+    /// Which of them are read, in order; each once where it is empty.
+    rows: Vec<u32>,
     material: Material,
     /// Spot, source and aperture, over which readings are means.
     cones: Option<Arc<Cones>>,
@@ -44,18 +56,38 @@ pub struct Outcome {
 }
 
 impl Experiment {
+    /// In the plane of incidence, of a material of the fitted model.
     pub fn new(preset: &str, truth: [f64; 3]) -> Self {
         let spec: SimulationSpec = Preset::find(preset).expect("built in").spec().expect("reads");
         let described = spec.instrument;
         let [kd, ks, n] = truth;
-        let mut lobes = vec![(LobeKind::Lambert, vec![kd], vec![])];
-        if ks > 0.0 {
-            lobes.push((LobeKind::Phong, vec![ks], vec![n]));
-        }
-        let material = Material::new(vec!["y".into()], lobes);
+        let lobes: &[(f64, f64)] = if ks > 0.0 { &[(ks, n)] } else { &[] };
         let directions = scan(width(&described, truth));
         let cones = Cones::of(&described).map(Arc::new);
-        Self { described, truth, directions, material, cones }
+        Self { described, truth: Some(truth), directions, rows: Vec::new(), material: material(kd, lobes), cones }
+    }
+
+    /// All round the sample, and round the mirror directions.
+    pub fn out_of_plane(preset: &str) -> Self {
+        let plane = Self::new(preset, GLOSSY);
+        Self { directions: hemisphere(width(&plane.described, GLOSSY)), ..plane }
+    }
+
+    /// Three Phong lobes: one more than the reduction's own model has, and two more than that of the classes, by which no parameter would be right.
+    pub fn misfit(preset: &str) -> Self {
+        let material = material(0.2, &[(0.06, 15.0), (0.04, 100.0), (0.02, 500.0)]);
+        Self { truth: None, material, ..Self::new(preset, GLOSSY) }
+    }
+
+    /// Each pair is approached twice and read three times then, with short visits to the reference after every fourth: so many that several of them
+    /// are one component.
+    pub fn visits(preset: &str) -> Self {
+        let mut of = Self::new(preset, GLOSSY);
+        of.described.readings = 3;
+        of.described.protocol = Protocol { block: 4, repeats: 2 };
+        let once = 0..of.directions.len() as u32;
+        of.rows = once.clone().chain(once).collect();
+        of
     }
 
     /// What each reading stands for.
@@ -81,7 +113,7 @@ impl Experiment {
             true
         };
         let along = Job::new(&truth, &self.material.channels, &self.described, (&self.directions, &Weights::Uniform));
-        work(&Job { lobes: Some(&self.material), seed, accuracy: ACCURACY, ..along })
+        work(&Job { lobes: Some(&self.material), rows: &self.rows, seed, accuracy: ACCURACY, ..along })
     }
 
     /// Reduced as a user does: by the described instrument.
@@ -97,7 +129,8 @@ impl Experiment {
 
     /// A fit with the σ that the measurement states, at face value or through the instrument.
     fn parameters(&self, m: &Measurement, through: bool) -> [Option<bool>; 3] {
-        let matte = self.truth[1] == 0.0;
+        let Some(truth) = self.truth else { return [None; 3] };
+        let matte = truth[1] == 0.0;
         let model = if matte { "lambert" } else { "lambert+phong" };
         let sight = self.cones.clone().filter(|_| through).map(|cones| cones as Arc<dyn Sight>);
         let plain = FitOptions::new(model.parse().expect("a model"));
@@ -105,14 +138,21 @@ impl Experiment {
         let material = fit(m, &options).expect("fits").material;
         let record = material.fit.as_ref().expect("a record");
         let holds = |interval: Option<(f64, f64)>, truth: f64| interval.map(|(a, b)| a <= truth && truth <= b);
-        let kd = holds(record.interval_95[0].weight[0], self.truth[0]);
+        let kd = holds(record.interval_95[0].weight[0], truth[0]);
         if matte {
             return [kd, None, None];
         }
         let lobe = &record.interval_95[1];
         let PerChannel::Shared(exponent) = &lobe.shape[0].1 else { panic!("one exponent") };
-        [kd, holds(lobe.weight[0], self.truth[1]), holds(*exponent, self.truth[2])]
+        [kd, holds(lobe.weight[0], truth[1]), holds(*exponent, truth[2])]
     }
+}
+
+/// One channel, a Lambert lobe and Phong lobes of these weights and exponents.
+fn material(kd: f64, phong: &[(f64, f64)]) -> Material {
+    let mut lobes = vec![(LobeKind::Lambert, vec![kd], vec![])];
+    lobes.extend(phong.iter().map(|(ks, n)| (LobeKind::Phong, vec![*ks], vec![*n])));
+    Material::new(vec!["y".into()], lobes)
 }
 
 /// Independent and shared errors of a reading together, one σ.
@@ -130,10 +170,12 @@ fn width(instrument: &Instrument, [_, ks, n]: [f64; 3]) -> f64 {
     (own * own + cones.iter().sum::<f64>() + spot * spot).sqrt()
 }
 
+const INCIDENCES_DEG: [f64; 2] = [20.0, 45.0];
+
 /// In the plane of incidence at 20° and 45°: about the mirror direction at shares of the lobe's width, and coarsely elsewhere.
 fn scan(width_deg: f64) -> Directions {
     let (mut wi, mut wo) = (Vec::new(), Vec::new());
-    for theta in [20.0, 45.0] {
+    for theta in INCIDENCES_DEG {
         let near = [0.0, 0.3, 0.6, 1.0, 1.4, 1.8, 2.3, 2.8, 3.5].into_iter();
         let about = near
             .flat_map(|k: f64| if k == 0.0 { vec![theta] } else { vec![theta - k * width_deg, theta + k * width_deg] });
@@ -142,6 +184,33 @@ fn scan(width_deg: f64) -> Directions {
             wi.push(direction_deg(theta, 0.0));
             wo.push(direction_deg(theta_o, 180.0));
         }
+    }
+    Directions::List { wi, wo }
+}
+
+/// All round the normal at 20° and 45°, and on circles about the mirror direction whose radii are shares of the lobe's width.
+fn hemisphere(width_deg: f64) -> Directions {
+    let (mut wi, mut wo) = (Vec::new(), Vec::new());
+    let all_round = [10.0, 25.0, 40.0, 55.0, 70.0]
+        .into_iter()
+        .flat_map(|theta| (0..12).map(move |k| direction_deg(theta, 30.0 * f64::from(k))));
+    let all_round: Vec<DVec3> = std::iter::once(DVec3::Z).chain(all_round).collect();
+    for theta in INCIDENCES_DEG {
+        let mirror = direction_deg(theta, 180.0);
+        let across = DVec3::Z.cross(mirror).normalize();
+        let along = across.cross(mirror);
+        let circle = |share: f64| {
+            let (sin, cos) = (share * width_deg).to_radians().sin_cos();
+            (0..8).map(move |k| {
+                let (around_sin, around_cos) = (45.0 * f64::from(k)).to_radians().sin_cos();
+                cos * mirror + sin * (around_cos * along + around_sin * across)
+            })
+        };
+        let near = std::iter::once(mirror).chain([0.6, 1.2, 2.0].into_iter().flat_map(circle));
+        let above = near.filter(|wo| wo.z > 75f64.to_radians().cos());
+        let of_incidence: Vec<DVec3> = above.chain(all_round.iter().copied()).collect();
+        wi.extend(std::iter::repeat_n(direction_deg(theta, 0.0), of_incidence.len()));
+        wo.extend(of_incidence);
     }
     Directions::List { wi, wo }
 }

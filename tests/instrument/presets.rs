@@ -1,12 +1,12 @@
 //! The built-in instruments: what is published of such instruments is what they come out at.
 
-use crate::experiment::{CLASSES, Experiment, Held, coverage, sigma};
+use crate::experiment::{CLASSES, Experiment, Held, STUDIES, coverage, sigma};
 use crate::support::*;
 use goniofit::chain;
 use goniofit::control::Control;
 use goniofit::geometry::angles::theta_of;
 use goniofit::gonio::parts::{Axes, Detector};
-use goniofit::gonio::{Actual, Instrument, Job, Preset, series};
+use goniofit::gonio::{Actual, Instrument, Job, Kind, Preset, series};
 use goniofit::measurement::{Directions, Measurement};
 
 fn preset(name: &str) -> Instrument {
@@ -73,7 +73,7 @@ fn a_commercial_aperture_lowers_a_glossy_peak_by_one_to_three_per_cent() {
 fn what_a_study_expects_is_what_the_instrument_reads() {
     for (name, class) in [("commercial", 1), ("standards-lab", 2)] {
         let of = Experiment::new(name, CLASSES[class].1);
-        let (kd, ks, n) = (of.truth[0], of.truth[1], of.truth[2]);
+        let [kd, ks, n] = CLASSES[class].1;
         let scan = (of.directions.clone(), goniofit::measurement::Weights::Uniform);
         let nominal = |i: &Instrument| Instrument {
             electrons: 0.0,
@@ -127,6 +127,38 @@ fn intervals_of_every_built_in_instrument_hold_the_truth() {
             assert!(near(found.mean), "{name}, {class}: {}", found.mean);
             let fine = |of: &Held| if of.stated < 1.0 { of.held > 0.95 - slack } else { near(of.held) };
             assert!(through.iter().flatten().all(fine), "{name}, {class}: {through:?}");
+        }
+    }
+}
+
+/// Readings all round the sample, of a material that no fitted model has, and by repeats and many visits to the reference: 20 instruments each, of which
+/// as above only gross faults show. `cargo bench --bench instrument_coverage -- out-of-plane misfit visits` redraws 2,000.
+#[test]
+fn intervals_hold_out_of_the_plane_of_what_no_model_is_and_over_many_visits() {
+    let count = 20;
+    let slack = 4.0 * (0.95 * 0.05 / count as f64).sqrt();
+    for (name, study) in STUDIES {
+        let of = study("commercial");
+        let found = coverage(&of, 0..count);
+        println!(
+            "{name}: {:.1} % of {} readings, {:.1} % at least",
+            100.0 * found.mean,
+            found.readings,
+            100.0 * found.least.0
+        );
+        assert!((found.mean - 0.95).abs() < slack, "{name}: {}", found.mean);
+        let raw = of.raw(0);
+        let stops = |kind: Kind| {
+            let all = raw.readings.chunk_by(|a, b| a.stop == b.stop);
+            all.filter(|stop| stop[0].kind == kind).count()
+        };
+        let pairs = of.directions.len();
+        let aside = (0..pairs).filter(|i| of.directions.pair(*i).1.y.abs() > 0.1).count();
+        match name {
+            "out-of-plane" => assert!(aside > pairs / 2 && found.readings > pairs / 2, "{aside} of {pairs}"),
+            "misfit" => assert!(found.parameters.iter().flatten().all(Option::is_none)),
+            // Six components of visits at most, so that four visits and more are one.
+            _ => assert!(stops(Kind::Sample) == 2 * pairs && stops(Kind::Reference) >= 18, "{pairs}"),
         }
     }
 }
