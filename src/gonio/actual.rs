@@ -20,6 +20,8 @@ pub struct Actual {
     pub certificate: f64,
     /// Relative nonlinearity at full well.
     pub nonlinearity: f64,
+    /// Relative errors of the exposure times, in their order; empty for none.
+    pub exposures: Vec<f64>,
     /// Source power over its first, less 1, at each reading; empty where it does not drift.
     pub power: Vec<f64>,
     /// Dark current less its mean, electrons a second, at each reading; empty where it does not drift.
@@ -46,6 +48,7 @@ impl Actual {
             height_m: draw(instrument.sample.height_u_m),
             certificate: draw(instrument.reference.reflectance_u),
             nonlinearity: draw(instrument.detector.nonlinearity_u),
+            exposures: instrument.detector.exposures_s.iter().map(|_| draw(instrument.detector.exposure_u)).collect(),
             power: walk(instrument.source.drift_per_sqrt_hour, readings, stream(seed, Purpose::Instrument, POWER)),
             dark: walk(instrument.detector.dark_drift_per_sqrt_hour, readings, stream(seed, Purpose::Instrument, DARK)),
         }
@@ -69,6 +72,7 @@ impl Actual {
             height_m: 0.0,
             certificate: 0.0,
             nonlinearity: 0.0,
+            exposures: Vec::new(),
             power: Vec::new(),
             dark: Vec::new(),
         }

@@ -25,6 +25,11 @@ pub fn idle(instrument: &Instrument, channels: &[String]) -> Vec<String> {
             "detector.distance_m",
             "source.beam_diameter_m or sample.height_u_m above 0",
         ),
+        (
+            detector.exposure_u > 0.0 && detector.exposures_s.len() < 2 && !no_reference,
+            "detector.exposure_u",
+            "two detector.exposures_s or more: an error that reference and sample share cancels",
+        ),
         (sample.diameter_m > 0.0 && no_beam, "sample.diameter_m", "source.beam_diameter_m above 0"),
         (detector.field_diameter_m > 0.0 && no_beam, "detector.field_diameter_m", "source.beam_diameter_m above 0"),
     ];
@@ -69,5 +74,13 @@ mod tests {
             assert!(said.iter().any(|s| s.contains(key) && s.contains(needs)), "{key}: {said:?}");
         }
         assert_eq!(idle(&instrument, &spectrum).len(), 2);
+        let mut timed = Instrument::default();
+        (timed.reference.reflectance, timed.detector.exposure_u) = (0.9, 1e-3);
+        let said = idle(&timed, &spectrum);
+        assert!(said.len() == 1 && said[0].contains("detector.exposure_u does nothing"), "{said:?}");
+        timed.detector.exposures_s = vec![0.1, 1.0];
+        assert!(idle(&timed, &spectrum).is_empty());
+        (timed.reference.reflectance, timed.detector.exposures_s) = (0.0, vec![1.0]);
+        assert!(idle(&timed, &spectrum).is_empty());
     }
 }

@@ -261,7 +261,7 @@ mod tests {
             change(&mut instrument);
             instrument.fault().unwrap_or_default()
         };
-        let cases: [(Change, &str); 11] = [
+        let cases: [(Change, &str); 12] = [
             (
                 |i| i.electrons = 1e-300,
                 "instrument.electrons: expected 0 (no noise) or a number from 1e-3 to 1e15, found 1e-300",
@@ -298,6 +298,10 @@ mod tests {
                 "instrument.detector.nonlinearity_u: expected a number from 0 to 0.2",
             ),
             (
+                |i| i.detector.exposure_u = -0.1,
+                "instrument.detector.exposure_u: expected a number from 0 to 0.2, found -0.1",
+            ),
+            (
                 |i| i.detector.exposures_s = vec![1e-12],
                 "one or more times from 1e-9 to 1e6 s, ascending, found [1e-12]",
             ),
@@ -305,5 +309,15 @@ mod tests {
         for (change, says) in cases {
             assert!(of(change).contains(says), "{} lacks {says}", of(change));
         }
+    }
+
+    /// Raw files say what made them: those of instruments without errors of exposure times are what they were before there were such.
+    #[test]
+    fn descriptions_have_errors_of_exposure_times_where_there_are_any() {
+        let mut instrument = Instrument::default();
+        let written = |i: &Instrument| serde_json::to_string(i).expect("plain data");
+        assert!(!written(&instrument).contains("exposure_u"));
+        instrument.detector.exposure_u = 1e-3;
+        assert_eq!(serde_json::from_str::<Instrument>(&written(&instrument)).expect("reads"), instrument);
     }
 }

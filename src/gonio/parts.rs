@@ -71,6 +71,9 @@ pub struct Detector {
     pub nonlinearity_u: f64,
     /// Exposures that a reading may take, s, ascending: the longest that does not saturate is kept.
     pub exposures_s: Vec<f64>,
+    /// Standard uncertainty of each of these times, relative: one error for all readings of an exposure, another for those of the next.
+    #[serde(skip_serializing_if = "is_none")]
+    pub exposure_u: f64,
 }
 
 impl Default for Detector {
@@ -86,8 +89,15 @@ impl Default for Detector {
             bits: 0,
             nonlinearity_u: 0.0,
             exposures_s: vec![1.0],
+            exposure_u: 0.0,
         }
     }
+}
+
+/// Whether a number is left out of what is written: descriptions of instruments without it stay what they were.
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde hands over a reference
+fn is_none(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// The reference standard that readings are compared with.
@@ -247,6 +257,7 @@ impl Detector {
             ("bits", f64::from(self.bits), 32.0),
             // From a quarter on no signal is safe from saturation.
             ("nonlinearity_u", self.nonlinearity_u, 0.2),
+            ("exposure_u", self.exposure_u, 0.2),
         ];
         let (far, field) = (("distance_m", self.distance_m), ("field_diameter_m", self.field_diameter_m));
         let well = [("full_well", self.full_well, 1e-12, 1e18)];

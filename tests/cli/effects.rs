@@ -45,7 +45,7 @@ fn effect<'a>(said: &'a Value, name: &str) -> &'a Value {
 #[test]
 fn every_effect_is_listed_with_its_reason_and_what_it_changes() {
     let said = bench().json(&["effects", "lab.toml"]);
-    assert_eq!(said["effects"].as_array().map(Vec::len), Some(19));
+    assert_eq!(said["effects"].as_array().map(Vec::len), Some(20));
     for (name, on) in
         [("detector aperture", true), ("sample tilt", true), ("source divergence", false), ("read noise", true)]
     {

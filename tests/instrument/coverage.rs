@@ -44,6 +44,9 @@ fn readings_by_an_instrument_with_drift_dark_stray_light_and_a_certificate_hold_
     check("glossy", &material(0.2, 0.1, 60.0), &lab());
     let detector = Detector { offset: 2e3, ..lab().detector };
     check("glossy, an electronic offset", &material(0.2, 0.1, 60.0), &Instrument { detector, ..lab() });
+    // The peak is read in the short exposure, the reference in the long one.
+    let detector = Detector { exposure_u: 5e-3, ..lab().detector };
+    check("glossy, exposure times", &material(0.2, 0.1, 60.0), &Instrument { detector, ..lab() });
 }
 
 #[test]

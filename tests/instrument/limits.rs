@@ -116,6 +116,7 @@ fn drift_dark_read_noise_and_nonlinearity_fade_in_proportion() {
         own_orders("electronic offset", |x| detector(Detector { offset: x, ..Detector::default() }), 100.0),
         own_orders("read noise", noise, 10.0),
         own_orders("nonlinearity", bent, 0.01),
+        own_orders("exposure times", |x| detector(Detector { exposure_u: x, ..Detector::default() }), 0.01),
     ] {
         assert!(order.iter().all(|o| (o - 1.0).abs() < 1e-6), "{order:?}");
     }

@@ -6,6 +6,7 @@
 mod adaptive;
 mod bends;
 mod budget;
+mod cancels;
 mod cones;
 mod contributions;
 mod coverage;

@@ -8,6 +8,7 @@ mod band;
 pub(super) mod cone;
 mod dark;
 mod divergence;
+mod exposure;
 pub(super) mod footprint;
 pub(super) mod height;
 mod jitter;
@@ -117,8 +118,15 @@ const GEOMETRY: [Entry; 7] =
 /// Effects on the flux, electrons a second.
 const FLUX: [Entry; 6] = [band::EFFECT, footprint::EFFECT, shadow::EFFECT, stray::EFFECT, power::EFFECT, dark::EFFECT];
 /// Effects on the electrons of a reading.
-const DETECTOR: [Entry; 6] =
-    [shot::EFFECT, offset::EFFECT, saturation::EFFECT, nonlinearity::EFFECT, read_noise::EFFECT, quantisation::EFFECT];
+const DETECTOR: [Entry; 7] = [
+    exposure::EFFECT,
+    shot::EFFECT,
+    offset::EFFECT,
+    saturation::EFFECT,
+    nonlinearity::EFFECT,
+    read_noise::EFFECT,
+    quantisation::EFFECT,
+];
 
 fn effects() -> impl Iterator<Item = &'static Entry> {
     GEOMETRY.iter().chain(&FLUX).chain(&DETECTOR)

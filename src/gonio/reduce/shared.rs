@@ -6,7 +6,8 @@
 
 use super::alike::alike;
 use super::budget::{Budget, Input, Type};
-use super::visits::{Gap, Visits};
+use super::stops::are_same;
+use super::visits::{Gap, Timed, Visits};
 use super::{Reduced, Table};
 use crate::gonio::instrument::Instrument;
 
@@ -66,6 +67,8 @@ pub(super) struct Shared<'a> {
     places: std::collections::HashMap<(usize, usize, usize), usize>,
     /// Visits to the base, and to the reference, that are one component.
     groups: [usize; 2],
+    /// Exposures whose errors have a component.
+    exposures_s: Vec<f64>,
     has_reference: bool,
     /// When the last reading was made.
     end_s: f64,
@@ -82,12 +85,13 @@ const CERTIFICATE: usize = 3;
 const DRIFT: usize = 4;
 const DARK: usize = 5;
 const NONLINEARITY: usize = 6;
-pub(super) const ZEROS: usize = 7;
-pub(super) const TILT: usize = 8;
-pub(super) const HEIGHT: usize = 9;
-pub(super) const JITTER: usize = 10;
+const EXPOSURES: usize = 7;
+pub(super) const ZEROS: usize = 8;
+pub(super) const TILT: usize = 9;
+pub(super) const HEIGHT: usize = 10;
+pub(super) const JITTER: usize = 11;
 /// Name, how it is known, and the unit of what readings depend on.
-const NAMES: [(&str, Type, &str); 11] = [
+const NAMES: [(&str, Type, &str); 12] = [
     ("noise of the reading", Type::A, "1/s"),
     ("noise of the reference", Type::A, "1/s"),
     ("noise of blank and dark", Type::A, "1/s"),
@@ -95,6 +99,7 @@ const NAMES: [(&str, Type, &str); 11] = [
     ("source drift", Type::B, "1/√h"),
     ("dark drift", Type::B, "1/s/√h"),
     ("nonlinearity", Type::B, ""),
+    ("exposure times", Type::B, ""),
     ("axis zeros", Type::B, "°"),
     ("sample tilt", Type::B, "°"),
     ("sample height", Type::B, "m"),
@@ -126,6 +131,7 @@ impl<'a> Shared<'a> {
             of_stops: Vec::new(),
             places: std::collections::HashMap::new(),
             groups: visits.len().map(|count| count.div_ceil(afforded).max(1)),
+            exposures_s: Vec::new(),
             has_reference: visits.has[1],
             end_s,
         }
@@ -214,7 +220,7 @@ impl<'a> Shared<'a> {
             self.add_grouped((REFERENCE, OF_REFERENCE), part.visit, channel, place, u);
         }
         for part in &at.base_parts {
-            let sensitivity = value / at.reference * part.through_reference - conversion * part.direct;
+            let sensitivity = part.sensitivity(value / at.reference, conversion);
             self.families[BASE].was_read(part.sigma, sensitivity);
             let u = sensitivity * part.sigma;
             self.add_grouped((BASE, OF_BASE), part.visit, channel + self.width * part.list, place, u);
@@ -243,6 +249,36 @@ impl<'a> Shared<'a> {
             let bent = conversion * (rate.mean * rate.signal - at.base_bent) - of_reference;
             self.add(NONLINEARITY, (0, 0), place, detector.nonlinearity_u / detector.full_well * bent);
         }
+        if detector.exposure_u > 0.0 {
+            self.exposures(place, of);
+        }
+    }
+
+    /// Adds what errors of exposure times do to one reading: each exposure has its own, in all that was read in it. What sample, reference and base share
+    /// cancels in their ratio.
+    fn exposures(&mut self, place: usize, of: &Reduced) {
+        let Reduced { value, conversion, rate, ref at, .. } = *of;
+        let detector = &self.instrument.detector;
+        let own = Timed::new(rate.exposure_s, rate.mean, detector.offset);
+        let of_reference = at.reference_parts.iter().map(|p| (p.timed, -value / at.reference * p.share));
+        let of_base = at.base_parts.iter().map(|p| (p.timed, p.sensitivity(value / at.reference, conversion)));
+        let parts: Vec<(Timed, f64)> = std::iter::once((own, conversion)).chain(of_reference).chain(of_base).collect();
+        if self.has_reference && parts.iter().all(|(timed, _)| are_same(timed.exposure_s, rate.exposure_s)) {
+            return;
+        }
+        for (Timed { exposure_s, rate }, sensitivity) in parts {
+            let component = self.exposure(exposure_s);
+            self.add(EXPOSURES, (component, 0), place, detector.exposure_u * sensitivity * rate);
+        }
+    }
+
+    /// The number of an exposure.
+    fn exposure(&mut self, exposure_s: f64) -> usize {
+        let found = self.exposures_s.iter().position(|known| are_same(*known, exposure_s));
+        found.unwrap_or_else(|| {
+            self.exposures_s.push(exposure_s);
+            self.exposures_s.len() - 1
+        })
     }
 
     /// A walk of σ `per_sqrt_hour` that is 0 at the start and known nowhere else, as Lévy made it: to its end in a line, and in the middle of each half, quarter
@@ -326,6 +362,7 @@ impl<'a> Shared<'a> {
             DRIFT => source.drift_per_sqrt_hour,
             DARK => detector.dark_drift_per_sqrt_hour,
             NONLINEARITY => detector.nonlinearity_u,
+            EXPOSURES => detector.exposure_u,
             ZEROS => axes.zero_u_deg,
             TILT => sample.tilt_u_deg,
             HEIGHT => sample.height_u_m,

@@ -57,6 +57,14 @@ pub(super) struct BasePart {
     pub through_reference: f64,
     /// σ of its rate.
     pub sigma: f64,
+    pub timed: Timed,
+}
+
+impl BasePart {
+    /// What a reading changes by with its rate, of `per_reference` with the reference's net rate and of `conversion` with its own.
+    pub fn sensitivity(&self, per_reference: f64, conversion: f64) -> f64 {
+        per_reference * self.through_reference - conversion * self.direct
+    }
 }
 
 /// A reading of the reference in a reading of the sample.
@@ -68,6 +76,22 @@ pub(super) struct ReferencePart {
     pub share: f64,
     /// σ of its rate.
     pub sigma: f64,
+    pub timed: Timed,
+}
+
+/// What an exposure's error acts on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Timed {
+    pub exposure_s: f64,
+    /// Signal a second of what comes while it lasts: without the offset of the electronics.
+    pub rate: f64,
+}
+
+impl Timed {
+    /// Of a rate that has an offset of so much signal in it.
+    pub fn new(exposure_s: f64, mean: f64, offset: f64) -> Self {
+        Self { exposure_s, rate: mean - offset / exposure_s }
+    }
 }
 
 /// What is known of one moment and channel.
@@ -228,7 +252,7 @@ impl Visits {
         let (mut base_parts, mut base_bent) = (Vec::with_capacity(4), 0.0);
         for (i, share) in around {
             base_bent += share * base_list[i].bent();
-            add_part(&mut base_parts, base_list, i, (share, 0.0));
+            self.add_part(&mut base_parts, base_list, i, (share, 0.0));
         }
         let (mut reference, mut reference_bent, mut reference_parts) = (0.0, 0.0, Vec::with_capacity(2));
         let (_, around, reference_gap) = interpolated(reference_list, time_s);
@@ -237,9 +261,10 @@ impl Visits {
             let (under, (base_list, of_base), _) = self.base_at(channel, point.time_s, point.exposure_s);
             reference += share * (point.mean - under);
             reference_bent += share * point.bent();
-            reference_parts.push(ReferencePart { visit: point.visit, share, sigma: point.variance.sqrt() });
+            let (sigma, timed) = (point.variance.sqrt(), self.timed(&point));
+            reference_parts.push(ReferencePart { visit: point.visit, share, sigma, timed });
             for (k, part) in of_base {
-                add_part(&mut base_parts, base_list, k, (0.0, share * part));
+                self.add_part(&mut base_parts, base_list, k, (0.0, share * part));
                 reference_bent -= share * part * base_list[k].bent();
             }
         }
@@ -247,6 +272,22 @@ impl Visits {
             reference = 1.0;
         }
         At { base, reference, base_parts, reference_parts, base_bent, reference_bent, base_gap, reference_gap }
+    }
+
+    /// Adds what a moment has of a reading of the base, directly and through the reference.
+    fn add_part(&self, parts: &mut Vec<BasePart>, points: &[Point], i: usize, (direct, through_reference): (f64, f64)) {
+        let Point { visit, list, variance, .. } = points[i];
+        if let Some(part) = parts.iter_mut().find(|part| (part.visit, part.list) == (visit, list)) {
+            part.direct += direct;
+            part.through_reference += through_reference;
+        } else {
+            let (sigma, timed) = (variance.sqrt(), self.timed(&points[i]));
+            parts.push(BasePart { visit, list, direct, through_reference, sigma, timed });
+        }
+    }
+
+    fn timed(&self, point: &Point) -> Timed {
+        Timed::new(point.exposure_s, point.mean, self.offset)
     }
 }
 
@@ -275,18 +316,6 @@ impl IntoIterator for Around {
 
     fn into_iter(self) -> Self::IntoIter {
         self.0.into_iter().flatten()
-    }
-}
-
-/// Adds what a moment has of a reading of the base, directly and through the reference.
-fn add_part(parts: &mut Vec<BasePart>, list: &[Point], i: usize, (direct, through_reference): (f64, f64)) {
-    let Point { visit, list, variance, .. } = list[i];
-    match parts.iter_mut().find(|part| (part.visit, part.list) == (visit, list)) {
-        Some(part) => {
-            part.direct += direct;
-            part.through_reference += through_reference;
-        }
-        None => parts.push(BasePart { visit, list, direct, through_reference, sigma: variance.sqrt() }),
     }
 }
 
