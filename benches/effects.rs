@@ -1,5 +1,5 @@
-//! What each effect of the instrument costs: `cargo bench --bench effects` prints readings per second, ideal, with each effect alone, and with all. What
-//! `benches/zero-cost.sh` counts instructions of: `-- --once by-hand` reads f·cosθo without any pass, `ideal` an instrument without parts, `without NAME`
+//! What each effect of the instrument costs: `cargo bench --bench effects` prints readings per second, ideal, with each effect alone, and with all; the
+//! spectral band, which one channel has not, of a material with 31 of them, beside what they take without it. What `benches/zero-cost.sh` counts instructions of: `-- --once by-hand` reads f·cosθo without any pass, `ideal` an instrument without parts, `without NAME`
 //! one with every part but that of an effect, `left-out NAME` one with all parts and the effect left out by name. Both make the same readings, those
 //! of blank and dark among them, and neither has parts that ask for the effect's own.
 #![allow(clippy::expect_used, clippy::panic)] // a bench may fail loudly
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 /// An effect, and what brings it.
 type Part = (&'static str, fn(&mut Instrument));
 
-const PARTS: [Part; 17] = [
+const PARTS: [Part; 19] = [
     ("axis zeros", |i| i.axes.zero_u_deg = 0.05),
     ("axis jitter", |i| i.axes.jitter_deg = 0.02),
     ("sample tilt", |i| i.sample.tilt_u_deg = 0.05),
@@ -24,17 +24,22 @@ const PARTS: [Part; 17] = [
     ("spot extent", |i| (i.source.beam_diameter_m, i.detector.distance_m) = (0.01, 0.5)),
     ("source divergence", |i| i.source.divergence_deg = 0.2),
     ("detector aperture", |i| i.detector.aperture_deg = 1.0),
+    (BAND, |i| i.source.bandwidth_nm = 5.0),
     ("footprint", |i| (i.source.beam_diameter_m, i.sample.diameter_m) = (0.01, 0.02)),
     ("shadow", |i| i.surroundings.shadow_deg = 3.0),
     ("stray light", |i| i.surroundings.stray_per_sr = 2e-3),
     ("source drift", |i| i.source.drift_per_sqrt_hour = 5e-3),
     ("dark current", |i| i.detector.dark_per_s = 200.0),
+    ("exposure times", |i| i.detector.exposure_u = 1e-3),
     ("electronic offset", |i| i.detector.offset = 50.0),
     ("saturation", |i| i.detector.full_well = 1e9),
     ("nonlinearity", |i| (i.detector.full_well, i.detector.nonlinearity_u) = (1e9, 0.003)),
     ("read noise", |i| i.read_noise = 8.0),
     ("quantisation", |i| (i.detector.full_well, i.detector.bits) = (1e9, 24)),
 ];
+
+/// The effect that only channels of wavelengths have.
+const BAND: &str = "spectral band";
 
 /// Counts electrons, so that every part can be added; its shot noise is left out by name.
 fn bare() -> Instrument {
@@ -52,13 +57,20 @@ fn material() -> Material {
     Material::new(vec!["y".into()], lobes)
 }
 
+/// The same lobes in channels from 400 nm to 700 nm, a diffuse part that rises and falls.
+fn spectrum() -> Material {
+    let wavelengths: Vec<f64> = (0..31).map(|k| 400.0 + 10.0 * f64::from(k)).collect();
+    let diffuse = wavelengths.iter().map(|w| 0.2 + 0.1 * (w / 50.0).sin()).collect();
+    let lobes = vec![(LobeKind::Lambert, diffuse, vec![]), (LobeKind::Phong, vec![0.1; wavelengths.len()], vec![60.0])];
+    Material::new(wavelengths.iter().map(|w| format!("{w}nm")).collect(), lobes)
+}
+
 /// Steps of scans, degrees; of the instructions that all parts together take a part is enough.
 const STEP_DEG: f64 = 5.0;
 const COARSE_DEG: f64 = 20.0;
 
 /// Readings made, and the seconds that they took: those that an instrument makes itself, or those that `like` would make.
-fn read(instrument: &Instrument, like: &Instrument, step_deg: f64, left_out: &[&str]) -> (usize, f64) {
-    let of = material();
+fn read(of: &Material, instrument: &Instrument, like: &Instrument, step_deg: f64, left_out: &[&str]) -> (usize, f64) {
     let truth = |wi, wo, out: &mut [f64]| {
         of.write_value(wi, wo, out);
         true
@@ -108,23 +120,24 @@ fn once(args: &[String]) {
         let name = named();
         with(PARTS.iter().filter(move |p| !built_on(name).contains(&p.0)))
     };
+    let of = |name: &str| if name == BAND { spectrum() } else { material() };
     let readings = match args.first().map(String::as_str) {
         Some("by-hand") => return println!("{}", by_hand()),
-        Some("ideal") => read(&bare(), &bare(), STEP_DEG, &["shot noise"]),
+        Some("ideal") => read(&material(), &bare(), &bare(), STEP_DEG, &["shot noise"]),
         Some("without") => {
             let name = named();
             let without = with(PARTS.iter().filter(|p| p.0 != name && !built_on(name).contains(&p.0)));
-            read(&without, &all(), COARSE_DEG, &["shot noise"])
+            read(&of(name), &without, &all(), COARSE_DEG, &["shot noise"])
         }
-        Some("left-out") => read(&all(), &all(), COARSE_DEG, &["shot noise", named()]),
+        Some("left-out") => read(&of(named()), &all(), &all(), COARSE_DEG, &["shot noise", named()]),
         other => panic!("expected by-hand, ideal, without NAME or left-out NAME, found {other:?}"),
     };
     println!("{:?}", readings.0);
 }
 
-fn row(name: &str, instrument: &Instrument, left_out: &[&str]) {
+fn row(name: &str, of: &Material, instrument: &Instrument, left_out: &[&str]) {
     let rate = |(count, seconds): (usize, f64)| count as f64 / seconds;
-    let best = (0..5).map(|_| rate(read(instrument, instrument, STEP_DEG, left_out))).fold(0.0, f64::max);
+    let best = (0..5).map(|_| rate(read(of, instrument, instrument, STEP_DEG, left_out))).fold(0.0, f64::max);
     println!("| {name} | {best:.2e} |");
 }
 
@@ -134,8 +147,17 @@ fn main() {
         return once(&args[at + 1..]);
     }
     println!("| effects | readings a second, {} threads |\n|---|---|", rayon::current_num_threads());
-    row("none", &bare(), &["shot noise"]);
-    row("shot noise", &bare(), &[]);
-    PARTS.iter().for_each(|part| row(part.0, &with(std::iter::once(part)), &["shot noise"]));
-    row("all", &with(PARTS.iter()), &[]);
+    let (one, spectrum) = (material(), spectrum());
+    let alone = |part: &'static Part| with(std::iter::once(part));
+    row("none", &one, &bare(), &["shot noise"]);
+    row("shot noise", &one, &bare(), &[]);
+    let (band, others): (Vec<&Part>, Vec<&Part>) = PARTS.iter().partition(|part| part.0 == BAND);
+    others.into_iter().for_each(|part| row(part.0, &one, &alone(part), &["shot noise"]));
+    row("all", &one, &with(PARTS.iter()), &[]);
+    let channels = spectrum.channels.len();
+    row(&format!("none, {channels} channels"), &spectrum, &bare(), &["shot noise"]);
+    band.into_iter().for_each(|part| {
+        row(&format!("{BAND}, {channels} channels"), &spectrum, &alone(part), &["shot noise"]);
+    });
+    row(&format!("all, {channels} channels"), &spectrum, &with(PARTS.iter()), &[]);
 }

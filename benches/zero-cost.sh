@@ -32,8 +32,8 @@ echo "|---|---|---|---|"
 compare "all, against a bare loop" "$(count ideal)" "$(count by-hand)"
 shift || true
 effects=("$@")
-[ ${#effects[@]} -gt 0 ] || effects=("axis zeros" "axis jitter" "sample tilt" "sample height" "spot extent" "source divergence" "detector aperture" "footprint" "shadow"
-  "stray light" "source drift" "dark current" "electronic offset" "saturation" "nonlinearity" "read noise" "quantisation")
+[ ${#effects[@]} -gt 0 ] || effects=("axis zeros" "axis jitter" "sample tilt" "sample height" "spot extent" "source divergence" "detector aperture" "spectral band" "footprint" "shadow"
+  "stray light" "source drift" "dark current" "exposure times" "electronic offset" "saturation" "nonlinearity" "read noise" "quantisation")
 for effect in "${effects[@]}"; do
   judge "$effect" "$(count left-out "$effect")" "$(count without "$effect")"
 done
