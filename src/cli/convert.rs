@@ -11,7 +11,7 @@ use super::simulation::parse_scan;
 use super::ui::Ui;
 use crate::chain::{self, Source};
 use crate::gonio::Scan;
-use crate::measurement::{Dimension, Directions, Format, MerlAngles, MerlGrid, Weights};
+use crate::measurement::{Dimension, Directions, Format, MerlAngles, MerlGrid, Weights, formats};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -74,6 +74,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             *table
         }
         Source::Fitted(material) => {
+            formats::check_channels(&material.channels, format, &args.out)?;
             let scan = scan_of(args, format, material.is_flat(), options.merl_angles)?;
             chain::tabulate(&args.input, &material, &scan, ui.control())?
         }

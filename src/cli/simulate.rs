@@ -16,7 +16,7 @@ use super::ui::{Ui, significant};
 use crate::chain;
 use crate::control::counted;
 use crate::gonio::{self, Affordable, Job, Raw, Scan, Spared};
-use crate::measurement::Measurement;
+use crate::measurement::{Format, Measurement, formats};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -59,6 +59,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     stdout_is_free(&args.out, ui)?;
     let plan = Plan::new(&args.what, Some(&args.out))?;
     let (source, name) = plan.load()?;
+    formats::check_channels(source.channels(), format, &args.out)?;
+    if let Some(raw) = &args.raw {
+        formats::check_channels(source.channels(), Format::Csv, raw)?;
+    }
     for said in gonio::idle(&plan.instrument, source.channels()) {
         ui.warn(&said);
     }

@@ -60,6 +60,31 @@ fn too_many_readings_are_refused_with_their_number_before_any_work() {
     b.ok(&simulated(&["--readings", "1000000000", "--out", "x.csv"]));
 }
 
+/// A file that could not be written is refused before anything is read, here of three million readings.
+#[test]
+fn channels_called_like_other_columns_are_refused_before_any_reading() {
+    let b = Bench::new();
+    for name in ["mask_reason", "weight", "sigma_y", "time_s"] {
+        b.write(
+            "m.json",
+            format!(
+                r#"{{"format": "goniofit-material", "version": 1, "model": "lambert", "channels": ["{name}"],
+                    "lobes": [{{"kind": "lambert", "weight": [0.5]}}]}}"#
+            ),
+        );
+        let fine = ["simulate", "--material", "m.json", "--instrument", "classroom", "--scan", "hemisphere:2"];
+        for out in [&["--out", "x.csv"][..], &["--out", "x.csv", "--raw", "r.csv"], &["--out", "-"]] {
+            let ran = b.run(&[&fine[..], out].concat());
+            assert_eq!(ran.code, Some(2), "{name}: {}", ran.err);
+            let said = format!("can't be called \"{name}\": that is the name of another column");
+            assert!(ran.err.contains(&said) && ran.out.is_empty(), "{name}: {}", ran.err);
+            assert_eq!(b.list("."), ["m.json"]);
+        }
+        let ran = b.run(&["convert", "m.json", "x.csv"]);
+        assert!(ran.code == Some(2) && ran.err.contains(name), "{name}: {}", ran.err);
+    }
+}
+
 #[test]
 fn means_over_cones_that_are_worse_than_asked_for_are_always_warned_of() {
     let b = Bench::new();

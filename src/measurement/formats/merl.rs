@@ -141,10 +141,7 @@ pub(super) fn write(
              write CSV instead, or fit a model and sample that"
         ));
     }
-    if measurement.channels.len() != 3 {
-        let names = measurement.channels.join(", ");
-        return refuse(format!("a MERL file holds three channels, r, g, b; this table has {names}; write CSV instead"));
-    }
+    check_channels(&measurement.channels, path)?;
     let mut report = WriteReport {
         lost_sigma: measurement.sigma.as_ref().map_or(0, |s| s.len() as u64),
         lost_common: measurement.common.len() as u64,
@@ -152,6 +149,16 @@ pub(super) fn write(
     };
     write_planes(measurement, out, &mut report).map_err(|e| MeasurementError::io(path, e))?;
     Ok(report)
+}
+
+/// Refuses other than three channels.
+pub(super) fn check_channels(channels: &[String], path: &Path) -> Result<(), MeasurementError> {
+    if channels.len() == 3 {
+        return Ok(());
+    }
+    let names = channels.join(", ");
+    let reason = format!("a MERL file holds three channels, r, g, b; this table has {names}; write CSV instead");
+    Err(MeasurementError::unsupported(path, reason))
 }
 
 fn write_planes(measurement: &Measurement, out: &mut dyn Write, report: &mut WriteReport) -> std::io::Result<()> {

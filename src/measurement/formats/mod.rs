@@ -231,6 +231,18 @@ pub fn write(
     }
 }
 
+/// Says before there is a table whether a file of this format holds channels of these names, as [`write()`] does of a table.
+///
+/// # Errors
+/// [`MeasurementError::Unsupported`] naming the channel.
+pub fn check_channels(channels: &[String], format: Format, path: &Path) -> Result<(), MeasurementError> {
+    match format {
+        Format::Merl => merl::check_channels(channels, path),
+        Format::Csv => csv::check_channels(channels, path),
+        Format::Alta | Format::Rgl | Format::Zemax | Format::Fred => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

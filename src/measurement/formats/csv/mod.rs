@@ -18,7 +18,7 @@ mod read;
 mod write;
 
 pub(super) use read::{read, read_directions};
-pub(super) use write::write;
+pub(super) use write::{check_channels, write};
 pub(crate) use write::{flat_deg, push_number, spherical_deg};
 
 use crate::measurement::MerlAngles;

@@ -20,11 +20,18 @@ pub(in crate::measurement::formats) fn write(
     path: &Path,
     out: &mut dyn Write,
 ) -> Result<(), MeasurementError> {
-    if let Some(name) = measurement.channels.iter().find(|name| is_reserved(name)) {
-        let reason = format!("a channel of a CSV file can't be called {name:?}: that is the name of another column");
-        return Err(MeasurementError::unsupported(path, reason));
-    }
+    check_channels(&measurement.channels, path)?;
     write_all(measurement, out).map_err(|e| MeasurementError::io(path, e))
+}
+
+/// Refuses channels that are called like other columns.
+pub(in crate::measurement::formats) fn check_channels(
+    channels: &[String],
+    path: &Path,
+) -> Result<(), MeasurementError> {
+    let Some(name) = channels.iter().find(|name| is_reserved(name)) else { return Ok(()) };
+    let reason = format!("a channel of a CSV file can't be called {name:?}: that is the name of another column");
+    Err(MeasurementError::unsupported(path, reason))
 }
 
 fn write_all(measurement: &Measurement, out: &mut dyn Write) -> std::io::Result<()> {
