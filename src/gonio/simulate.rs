@@ -1,5 +1,6 @@
 //! The forward simulation: truth, instrument and scan to a measurement.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
@@ -8,8 +9,8 @@ use rayon::prelude::*;
 use super::forward::lit_rows;
 use super::instrument::Instrument;
 use super::scan::Scan;
-use crate::control::{Control, counted};
-use crate::measurement::{Masked, Measurement, STOPPED};
+use crate::control::{Control, Stop, counted};
+use crate::measurement::{Directions, Masked, Measurement, STOPPED};
 use crate::numeric::sum::BLOCK;
 
 /// The material on the sample holder: writes the value of every channel for (wi, wo) above the horizon, in 1/sr (1/rad in the
@@ -31,35 +32,17 @@ pub fn simulate(
     let (directions, weights) = scan.directions()?;
     let (n, width) = (directions.len(), channels.len());
     let times = times(scan, n);
+    let at = Readings { truth, instrument, directions: &directions, times: &times, width, seed };
     let measured = AtomicU64::new(0);
     control.progress.start("measuring", n as u64);
-    let blocks: Vec<Block> = (0..n.div_ceil(BLOCK))
-        .into_par_iter()
-        .map(|b| {
-            let range = b * BLOCK..((b + 1) * BLOCK).min(n);
-            let len = range.len();
-            let (mut values, mut sigma) = (vec![f64::NAN; len * width], vec![f64::NAN; len * width]);
-            let (mut f, mut seen) = (vec![0.0; width], 0);
-            for (slot, i) in range.enumerate() {
-                if control.stop.requested() {
-                    break; // the rest is not measured
-                }
-                let (wi, wo) = directions.pair(i);
-                seen += u64::from(wi.z > 0.0 && wo.z > 0.0);
-                if wi.z > 0.0 && wo.z > 0.0 && truth(wi, wo, &mut f) {
-                    let repeated = times.get(i).map(|&times| repeated(instrument, times));
-                    let instrument = repeated.as_ref().unwrap_or(instrument);
-                    for (c, f) in f.iter().enumerate() {
-                        let reading = instrument.read(*f, wo.z, seed, (i * width + c) as u64);
-                        (values[c * len + slot], sigma[c * len + slot]) = reading;
-                    }
-                }
-            }
-            measured.fetch_add(seen, Ordering::Relaxed);
-            control.progress.advance(len as u64);
-            (values, sigma)
-        })
-        .collect();
+    let block = |b: usize| {
+        let range = b * BLOCK..((b + 1) * BLOCK).min(n);
+        let (len, (block, seen)) = (range.len(), at.block(range, control.stop));
+        measured.fetch_add(seen, Ordering::Relaxed);
+        control.progress.advance(len as u64);
+        block
+    };
+    let blocks: Vec<Block> = (0..n.div_ceil(BLOCK)).into_par_iter().map(block).collect();
     control.progress.finish();
     let values = join_planes(width, &blocks, |b| &b.0);
     let marked = values.iter().filter(|v| v.is_nan()).count() as u64;
@@ -78,6 +61,42 @@ pub fn simulate(
         sigma,
         ..Measurement::new(name, directions, channels.to_vec(), values)
     })
+}
+
+/// What is read, and how.
+struct Readings<'a> {
+    truth: &'a Truth<'a>,
+    instrument: &'a Instrument,
+    directions: &'a Directions,
+    /// How often each pair of directions is read; empty where each is once.
+    times: &'a [u32],
+    width: usize,
+    seed: u64,
+}
+
+impl Readings<'_> {
+    /// Values and σ of some pairs of directions in a row, and how many of them lie above the horizon and were come to before a stop.
+    fn block(&self, range: Range<usize>, stop: &Stop) -> (Block, u64) {
+        let (len, width) = (range.len(), self.width);
+        let (mut values, mut sigma) = (vec![f64::NAN; len * width], vec![f64::NAN; len * width]);
+        let (mut f, mut seen) = (vec![0.0; width], 0);
+        for (slot, i) in range.enumerate() {
+            if stop.requested() {
+                break; // the rest is not measured
+            }
+            let (wi, wo) = self.directions.pair(i);
+            seen += u64::from(wi.z > 0.0 && wo.z > 0.0);
+            if wi.z > 0.0 && wo.z > 0.0 && (self.truth)(wi, wo, &mut f) {
+                let repeated = self.times.get(i).map(|&times| repeated(self.instrument, times));
+                let instrument = repeated.as_ref().unwrap_or(self.instrument);
+                for (c, f) in f.iter().enumerate() {
+                    let reading = instrument.read(*f, wo.z, self.seed, (i * width + c) as u64);
+                    (values[c * len + slot], sigma[c * len + slot]) = reading;
+                }
+            }
+        }
+        ((values, sigma), seen)
+    }
 }
 
 /// How often each pair of directions is read; empty where each is once.
