@@ -20,7 +20,8 @@ pub(super) struct Bend {
 }
 
 impl Bend {
-    fn patterns(&self) -> impl Iterator<Item = f64> {
+    /// What readings have in common of them, 1 σ each.
+    pub fn patterns(&self) -> impl Iterator<Item = f64> {
         let mean: f64 = self.squares.iter().sum();
         let squares = self.squares.iter().map(|q| std::f64::consts::SQRT_2 * q);
         squares.chain([mean]).chain(self.products.iter().copied())

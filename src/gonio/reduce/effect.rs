@@ -69,6 +69,13 @@ impl Effect {
     }
 }
 
+/// Whether what errors' squares do is worth knowing beside what they do in proportion.
+pub(super) fn is_curved(linear: &[f64], squares: &[f64]) -> bool {
+    let sum = |list: &[f64]| list.iter().map(|x| x * x).sum::<f64>();
+    let bent = 3.0 * sum(squares);
+    bent > CURVED * (sum(linear) + bent)
+}
+
 /// How many of the errors the instrument keeps: the first ones.
 pub(super) fn kept(errors: &[Off]) -> usize {
     errors.iter().filter(|(family, _, _)| *family != JITTER).count()
