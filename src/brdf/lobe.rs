@@ -1,5 +1,6 @@
 //! What the lobes have in common: their parameters, the coordinate they depend on, their basis values.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -85,6 +86,11 @@ pub trait Sight: Send + Sync + std::fmt::Debug {
 
     /// Of one whose time is over, so that all lobes it has filled since are 0: how many shapes had been made before.
     fn made_when_ended(&self) -> Option<u32> {
+        None
+    }
+
+    /// The same with nothing made yet that [`Self::fill`] keeps, so that what it takes to make it can be measured; `None` where nothing is kept.
+    fn anew(&self) -> Option<Arc<dyn Sight>> {
         None
     }
 

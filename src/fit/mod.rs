@@ -13,6 +13,7 @@ mod choose;
 mod copies;
 mod covariance;
 mod energy;
+mod evaluate;
 mod folded;
 mod identify;
 mod intervals;
@@ -51,6 +52,7 @@ use crate::measurement::Measurement;
 
 pub use choose::fit_best_model;
 pub use covariance::Interval;
+pub use evaluate::rmse_of;
 pub use limits::{Field, Limit, ParameterName};
 pub use loss::{Datum, Loss, Robust, RobustKind};
 pub use options::{Bootstrap, FitError, FitOptions, WeightMode};

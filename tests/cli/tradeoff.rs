@@ -83,6 +83,44 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     assert!(text.contains("goniofit fit paint.csv --model lambert+phong --loss cosine-l2 --part"), "{text}");
 }
 
+/// A sweep is of the fit that one makes: by its loss, its weights, its limits, through its instrument.
+#[test]
+fn a_sweep_of_fits_takes_what_a_fit_takes_and_says_it_again() {
+    let b = Bench::new();
+    b.write("wide.toml", "version = 1\n[instrument]\nelectrons = 1e6\n[instrument.detector]\naperture_deg = 4.0\n");
+    b.ok(&typed("simulate --material glossy-paint --instrument wide.toml --scan in-plane:6 --seed 3 --out m.csv"));
+    let own = "--robust huber --through wide.toml --max-angle 70 --use-sigma --bound phong.exponent=1..1e4";
+    let again = "--robust huber:1.345 --through wide.toml --max-angle 70 --use-sigma --bound phong.exponent=1..10000";
+    let args = format!("tradeoff fit m.csv {own} --parts 1,2,4 --targets 5% --trials 3 --out t");
+    let found = b.json(&typed(&args));
+    let command = format!("goniofit fit m.csv --model lambert+phong --loss cosine-l2 {again}");
+    assert_eq!(found["commands"], Value::from(vec![Value::from(typed(&command))]));
+    assert_eq!(b.json_file("t/tradeoff.json")["commands"], found["commands"]);
+    // The yardstick is the fit with these options, judged by one robust scale.
+    let fit = b.json(&typed(&format!("fit m.csv {own}")));
+    assert_eq!((&fit["fit"]["weights"], &fit["fit"]["robust"]), (&"sigma".into(), &"huber:1.345".into()));
+    let reference = found["reference"].to_string();
+    let rmse = format!("rmse {:.4e}", number(&fit["fit"]["rmse"]));
+    assert!(reference.contains(&rmse) && reference.contains("all fits are judged by huber:1.345"), "{rmse}: {reference}");
+    let plain = b.json(&typed("tradeoff fit m.csv --parts 1,2,4 --targets 5% --trials 3"));
+    assert_ne!(timeless(&plain), timeless(&found));
+    let excess = errors(&found, "lambert+phong", "excess");
+    assert!(excess[0] > 0.0 && excess.last() == Some(&0.0), "the fit to all is its own reference: {excess:?}");
+    let text = b.ok(&typed(&format!("{args} --advise excess=50%"))).text();
+    assert!(text.contains(again), "{text}");
+    follow(&b, &text, 1);
+    // Each channel apart, with shapes of its own.
+    let args = typed("tradeoff fit m.csv --per-channel --fix lambert.weight[r]=0.2 --parts 1,3 --targets 5% --trials 2");
+    let found = b.json(&args);
+    assert!(found["commands"].to_string().contains(r#""--per-channel","--fix","lambert.weight[r]=0.2""#), "{found}");
+    let excess = errors(&found, "lambert+phong", "excess");
+    assert!(excess[0] > 0.0 && excess.last() == Some(&0.0), "{excess:?}");
+    for (wrong, says) in [("--through ideal", "aperture_deg"), ("--use-sigma --weights uniform", "--weights")] {
+        let ran = b.run(&typed(&format!("tradeoff fit m.csv {wrong}")));
+        assert!(ran.code == Some(2) && ran.err.contains(says), "{wrong}: {ran:?}");
+    }
+}
+
 #[test]
 fn independent_samples_have_their_slope_and_a_cut_path_its_bias_whatever_the_threads() {
     let b = Bench::new();

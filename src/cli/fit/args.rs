@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use crate::brdf::{ModelSpec, SpecError};
 use crate::cli::info::Reading;
-use crate::fit::{Limit, Loss, Robust, WeightMode};
+use crate::fit::Loss;
 
-const MODEL: &str = "Model and loss";
-const SAMPLES: &str = "Samples and their weights";
+use super::shared::{MODEL, SAMPLES, Shared};
+
 const EFFORT: &str = "Effort";
 const OUTPUT: &str = "Output";
 
@@ -21,7 +21,6 @@ const OUTPUT: &str = "Output";
   goniofit fit gold.binary --fix phong.exponent=50 --bound lambert.weight=0..0.3
   goniofit fit satin.csv --through commercial
   goniofit fit gold.binary --target-rmse-excess 1%")]
-#[allow(clippy::struct_excessive_bools)] // each is an option of its own
 pub(in crate::cli) struct Args {
     /// Measurements; `-` is stdin
     #[arg(required = true)]
@@ -32,41 +31,14 @@ pub(in crate::cli) struct Args {
     /// What is minimised; docs/fit.md has the formulas
     #[arg(long, default_value = "cosine-l2", value_parser = parse_loss, value_name = "l2|cosine-l2|log|cuberoot|relative", help_heading = MODEL)]
     pub loss: Loss,
-    /// Let outliers count less; SCALE (1e-3 to 1e6) times the residuals' σ is where they begin [default SCALE: huber 1.345,
-    /// cauchy 2.385]
-    #[arg(long, value_name = "huber|cauchy[:SCALE]", help_heading = MODEL)]
-    pub robust: Option<Robust>,
-    /// Fit the material that this instrument's readings show, averaged over its aperture and its source's divergence as they are, rather
-    /// than take the readings for the material's values: a built-in one or a simulation file
-    #[arg(long, value_name = "INSTRUMENT", help_heading = MODEL)]
-    pub through: Option<String>,
-    /// How samples count
-    #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform", help_heading = SAMPLES)]
-    pub weights: WeightMode,
-    /// Weigh by the σ that the file states, instead of the solid angle
-    #[arg(long, conflicts_with = "weights", help_heading = SAMPLES)]
-    pub use_sigma: bool,
-    /// Leave out samples with θi or θo above this, degrees
-    #[arg(long, default_value_t = 80.0, value_name = "DEG", allow_negative_numbers = true, help_heading = SAMPLES)]
-    pub max_angle: f64,
+    #[command(flatten)]
+    pub shared: Shared,
     /// Use every N-th entry only
     #[arg(long, default_value_t = 1, value_name = "N", help_heading = SAMPLES)]
     pub stride: usize,
     /// Use one of every N entries only, at places that keep step with no grid
     #[arg(long, default_value_t = 1, value_name = "N", conflicts_with_all = ["stride", "time_budget", "target_rmse_excess"], help_heading = SAMPLES)]
     pub part: usize,
-    /// Let every channel have its own shapes
-    #[arg(long, help_heading = MODEL)]
-    pub per_channel: bool,
-    /// Hold a parameter at a value, phong.exponent=50 say; a second lobe of a kind is phong[1]; may be repeated for others
-    #[arg(long, value_name = "NAME=VALUE", value_parser = Limit::fixed, help_heading = MODEL)]
-    pub fix: Vec<Limit>,
-    /// Hold a parameter in a range, phong.exponent=1..1e4 or lambert.weight[r]=0..0.5 say; may be repeated for others
-    #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = Limit::range, help_heading = MODEL)]
-    pub bound: Vec<Limit>,
-    /// Fit under the constraint that no channel reflects more light than it receives
-    #[arg(long, help_heading = MODEL)]
-    pub conserve_energy: bool,
     /// Time that the fit may take, bootstrap included, 50ms or 2s say: it uses as many samples, and drawings, as that allows
     #[arg(long, value_name = "TIME", value_parser = parse_time, help_heading = EFFORT)]
     pub time_budget: Option<Duration>,
@@ -114,13 +86,6 @@ pub(in crate::cli) fn parse_loss(text: &str) -> Result<Loss, String> {
     Loss::from_name(text).ok_or_else(|| format!("known are {}", Loss::ALL.map(Loss::name).join(", ")))
 }
 
-fn parse_weights(text: &str) -> Result<WeightMode, String> {
-    [WeightMode::SolidAngle, WeightMode::Uniform]
-        .into_iter()
-        .find(|w| w.name() == text)
-        .ok_or_else(|| "known are solid-angle, uniform".into())
-}
-
 /// `50ms` or `2s`.
 pub(in crate::cli) fn parse_time(text: &str) -> Result<Duration, String> {
     if text.trim() == "0" {
@@ -133,13 +98,13 @@ pub(in crate::cli) fn parse_time(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// `1%` or `0.01`.
 /// A relative tolerance below 1: `1%` or `0.01`.
 pub(in crate::cli) fn parse_tolerance(text: &str) -> Result<f64, String> {
     let below_one = parse_share(text).ok().filter(|share| *share < 1.0);
     below_one.ok_or_else(|| "expected a relative tolerance above 0 and below 1, 1% or 0.01 say".into())
 }
 
+/// `1%` or `0.01`.
 pub(in crate::cli) fn parse_share(text: &str) -> Result<f64, String> {
     let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
     let share: Option<f64> = number.trim().parse().ok().filter(|share: &f64| *share > 0.0 && share.is_finite());

@@ -1,14 +1,12 @@
 //! From what was typed to a plan: the options of the fit, and where each result goes.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use super::args::{Args, Wanted};
-use crate::brdf::{Sight, SpecError};
+use crate::brdf::SpecError;
 use crate::cli::failure::Failure;
-use crate::cli::instrument::read_sight;
 use crate::cli::output::keeps_inputs;
-use crate::fit::{Bootstrap, FitOptions, Limit};
+use crate::fit::{Bootstrap, FitOptions};
 
 impl Args {
     /// The fit's options.
@@ -17,40 +15,14 @@ impl Args {
             Wanted::Model(model) => model.clone(),
             Wanted::Auto => "lambert".parse().map_err(|e: SpecError| Failure::work(e.to_string()))?,
         };
-        let limits: Vec<Limit> = self.fix.iter().chain(&self.bound).cloned().collect();
-        if let Some((first, second)) = Limit::doubled(&limits) {
-            let [first, second] = [first, second].map(|i| format!("{} {}", self.typed_by(i), limits[i]));
-            return Err(Failure::usage(format!(
-                "{first} and {second} limit the same parameter; expected one limit a parameter"
-            )));
-        }
         Ok(FitOptions {
-            loss: self.loss,
-            robust: self.robust,
-            weights: self.weights,
-            use_sigma: self.use_sigma,
-            max_angle_deg: self.max_angle,
             stride: self.stride,
             part: self.part,
-            per_channel: self.per_channel,
-            limits,
-            conserve_energy: self.conserve_energy,
-            through: self.sight()?,
             time_budget: self.time_budget,
             target_rmse_excess: self.target_rmse_excess,
             bootstrap: self.bootstrap.map(|replicates| Bootstrap { replicates, seed: self.seed }),
-            ..FitOptions::new(model)
+            ..self.shared.options(model, self.loss)?
         })
-    }
-
-    /// What lobes are seen through.
-    fn sight(&self) -> Result<Option<Arc<dyn Sight>>, Failure> {
-        self.through.as_deref().map(read_sight).transpose()
-    }
-
-    /// The option that limit `i` of all was typed with.
-    fn typed_by(&self, i: usize) -> &'static str {
-        if i < self.fix.len() { "--fix" } else { "--bound" }
     }
 }
 

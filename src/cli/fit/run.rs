@@ -97,7 +97,7 @@ fn one(
     };
     let mut fitted = fitted.map_err(|error| refused(args, file, error))?;
     if let Some(record) = &mut fitted.material.fit {
-        record.instrument = args.through.clone().filter(|name| name != "-");
+        record.instrument = args.shared.through.clone().filter(|name| name != "-");
     }
     if args.log {
         log(&fitted, ui);
@@ -108,7 +108,7 @@ fn one(
     }
     let page = if args.report { target.map(|t| t.with_extension("html")) } else { None };
     if let (Some(page), Some(target)) = (&page, target) {
-        let through = args.through.clone().map(|name| (name, options.through.clone()));
+        let through = args.shared.through.clone().map(|name| (name, options.through.clone()));
         let run =
             Run::of_fit(file, table, &target.display().to_string(), &fitted.material, through, report::this_run());
         report::write(&run, page)?;
@@ -127,14 +127,14 @@ fn one(
 
 /// Why there is no fit, with the options named as they were typed, and the file where the error does not name it.
 fn refused(args: &Args, file: &Path, error: FitError) -> Failure {
-    let held = |name: &str| args.fix.iter().any(|limit| limit.parameter.to_string() == name);
+    let held = |name: &str| args.shared.fix.iter().any(|limit| limit.parameter.to_string() == name);
     let several = args.files.len() > 1;
     let own = format!("{}: ", file.display());
     let (before, after) = match &error {
         FitError::Limit { name, .. } if held(name) => ("--fix ", String::new()),
         FitError::Limit { .. } => ("--bound ", String::new()),
         FitError::Infeasible { .. } => ("", " (--fix or --bound asks for them)".to_owned()),
-        FitError::NothingToFit { weightless: 1.., .. } if args.use_sigma => {
+        FitError::NothingToFit { weightless: 1.., .. } if args.shared.use_sigma => {
             ("", " (--use-sigma gives weight 0 where sigma is not positive)".to_owned())
         }
         FitError::NothingToFit { beyond: 1.., .. } => ("", " (--max-angle sets that limit)".to_owned()),

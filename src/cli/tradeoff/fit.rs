@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use super::Common;
 use crate::brdf::ModelSpec;
 use crate::cli::failure::Failure;
-use crate::cli::fit::{parse_loss, parse_share};
+use crate::cli::fit::{MODEL, Shared, parse_loss, parse_share};
 use crate::cli::info::Reading;
 use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
-use crate::fit::{FitOptions, Loss};
+use crate::fit::Loss;
 use crate::measurement::formats;
 use crate::tradeoff::fit::{FitSweep, sweep};
 
@@ -17,6 +17,7 @@ use crate::tradeoff::fit::{FitSweep, sweep};
 #[command(after_help = "Examples:
   goniofit tradeoff fit gold.binary --out tradeoff/
   goniofit tradeoff fit gold.binary --models lambert,lambert+phong,lambert+phong+phong --losses cosine-l2,log
+  goniofit tradeoff fit lab.csv --robust cauchy --through commercial --out tradeoff/
   goniofit tradeoff fit paint.csv --advise excess=1% --advise parameters=1e-3 --advise time=20ms")]
 pub(super) struct Args {
     /// The measurement; `-` is stdin
@@ -31,11 +32,13 @@ pub(super) struct Args {
     #[arg(long, value_delimiter = ',', value_name = "SHARE,…", default_value = "10%,1%,0.1%,0.01%", value_parser = parse_share)]
     targets: Vec<f64>,
     /// Losses to try; the first is the yardstick
-    #[arg(long, value_delimiter = ',', value_name = "LOSS,…", default_value = "cosine-l2", value_parser = parse_loss)]
+    #[arg(long, value_delimiter = ',', value_name = "LOSS,…", default_value = "cosine-l2", value_parser = parse_loss, help_heading = MODEL)]
     losses: Vec<Loss>,
     /// Models to try
-    #[arg(long, value_delimiter = ',', value_name = "SPEC,…", default_value = "lambert+phong")]
+    #[arg(long, value_delimiter = ',', value_name = "SPEC,…", default_value = "lambert+phong", help_heading = MODEL)]
     models: Vec<ModelSpec>,
+    #[command(flatten)]
+    shared: Shared,
     /// Key of all seeds
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -53,6 +56,10 @@ const LEAST: usize = 200;
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     args.common.prepare()?;
+    let (Some(model), Some(loss)) = (args.models.first(), args.losses.first()) else {
+        return Err(Failure::usage("expected at least one model and one loss"));
+    };
+    let options = args.shared.options(model.clone(), *loss)?;
     let table = formats::read(&args.file, &args.reading.options())?;
     for note in &table.notes {
         ui.note(&format!("{}: note: {note}", args.file.display()));
@@ -62,10 +69,6 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         parts = usual_parts(table.len());
     }
     let strides = descending(&args.strides);
-    let [Some(model), Some(loss)] = [args.models.first().map(|_| 0), args.losses.first().map(|_| 0)] else {
-        return Err(Failure::usage("expected at least one model and one loss"));
-    };
-    let options = FitOptions { loss: args.losses[loss], ..FitOptions::new(args.models[model].clone()) };
     let (losses, models) = (args.losses.clone(), args.models.clone());
     let mut targets = args.targets.clone();
     targets.sort_by(|a, b| b.total_cmp(a));
@@ -79,7 +82,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
 fn base(args: &Args) -> Vec<String> {
     let model = if let [model] = &args.models[..] { Some(model) } else { None };
     let loss = if let [loss] = &args.losses[..] { Some(loss.name()) } else { None };
-    let options = [args.reading.typed(), option("model", model), option("loss", loss)];
+    let options = [args.reading.typed(), option("model", model), option("loss", loss), args.shared.typed()];
     command(&["goniofit", "fit", &args.file.to_string_lossy()], options)
 }
 

@@ -246,6 +246,12 @@ impl Sight for Cones {
         shape.iter().all(|n| self.tables.as_ref().is_none_or(|tables| tables.prepare(*n, until)))
     }
 
+    fn anew(&self) -> Option<Arc<dyn Sight>> {
+        let Self { source, detector, spot, finesse, .. } = *self;
+        let tables = self.tables.as_ref().map(|_| Arc::new(Tables::new(source, detector)));
+        Some(Arc::new(Self { source, detector, tables, spot, finesse, kept: Kept::default() }))
+    }
+
     fn fill(&self, kind: LobeKind, shape: &[f64], places: &[Place], values: &mut [f64], derivatives: &mut [Vec<f64>]) {
         let (&[n], Some(slopes)) = (shape, derivatives.first_mut()) else {
             values.fill(kind.lobe().value(&[], 0.0, &mut []));

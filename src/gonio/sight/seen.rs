@@ -42,6 +42,11 @@ struct Held {
 }
 
 impl Tables {
+    /// Those for these discs that nobody else has, none made yet.
+    pub fn new(source: Disc, detector: Disc) -> Self {
+        Self { source, detector, octaves: Mutex::default(), recent: Mutex::default() }
+    }
+
     /// Those for these discs, one of which is wider than a point at least; the same ones as long as somebody holds them, or nobody has asked for others:
     /// readings and the fit that reduces them have the same cones.
     pub fn of(source: Disc, detector: Disc) -> Arc<Self> {
@@ -50,7 +55,7 @@ impl Tables {
         held.retain(|tables| tables.strong_count() > 0);
         let same = |tables: &Arc<Self>| tables.source == source && tables.detector == detector;
         let tables = held.iter().filter_map(Weak::upgrade).find(same).unwrap_or_else(|| {
-            let made = Arc::new(Self { source, detector, octaves: Mutex::default(), recent: Mutex::default() });
+            let made = Arc::new(Self::new(source, detector));
             held.push(Arc::downgrade(&made));
             made
         });

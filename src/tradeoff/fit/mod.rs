@@ -1,6 +1,7 @@
 //! What accuracy of a fit costs: how many samples it takes, the loss, the model.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::curve::{About, Beside, Sweep, curves, words};
@@ -78,7 +79,9 @@ pub fn sweep(
     let (series, settings) = design(measurement, what, &models, &yardstick);
     let runs = run(&settings, effort, control, |index, turn| {
         let way = &settings[index].what;
-        let options = FitOptions { draw: turn.seed, ..way.options.clone() };
+        // What the command would make anew is made anew: an instrument's tables of lobes.
+        let through = way.options.through.as_ref().map(|sight| sight.anew().unwrap_or_else(|| Arc::clone(sight)));
+        let options = FitOptions { draw: turn.seed, through, ..way.options.clone() };
         let clock = Instant::now();
         let fitted = fit(measurement, &options)?.material;
         let seconds = clock.elapsed().as_secs_f64();

@@ -3,7 +3,7 @@
 use crate::brdf::{Material, ModelSpec};
 use crate::chain::{ChainError, Source, Stage, render_material, scene};
 use crate::control::Control;
-use crate::fit::{Field, FitOptions, Limit, ParameterName, fit};
+use crate::fit::{Field, FitOptions, Limit, ParameterName, fit, rmse_of};
 use crate::measurement::{Dimension, Measurement};
 use crate::render::{self, Film, Options};
 
@@ -22,6 +22,8 @@ pub(super) struct Yardstick<'a> {
     whole: Vec<Whole>,
     /// The least rmse among them.
     best: f64,
+    /// Under a robust loss the s that all fits are judged by, for each has one of its own: that of the whole fit with the least one.
+    scales: Vec<f64>,
 }
 
 struct Whole {
@@ -54,8 +56,15 @@ impl<'a> Yardstick<'a> {
             })
         };
         let whole = models.iter().map(whole).collect::<Result<Vec<_>, _>>()?;
-        let best = whole.iter().map(|w| w.rmse).fold(f64::INFINITY, f64::min);
-        Ok(Self { measurement, options: plain, whole, best })
+        let scales = least_scales(&whole);
+        let mut found = Self { measurement, options: plain, whole, best: f64::NAN, scales };
+        if found.evaluates() {
+            for k in 0..found.whole.len() {
+                found.whole[k].rmse = found.rmse(&found.whole[k].material)?;
+            }
+        }
+        found.best = found.whole.iter().map(|w| w.rmse).fold(f64::INFINITY, f64::min);
+        Ok(found)
     }
 
     /// Whether a model's fit to all samples is the best one.
@@ -76,8 +85,18 @@ impl<'a> Yardstick<'a> {
         Ok(if is_rounding { errors.into_iter().map(|e| 0.0 * e).collect() } else { errors })
     }
 
-    /// The rmse over all samples of a material: that of a fit which holds every parameter.
+    /// Whether an rmse is worked out as it stands: a fit that holds every parameter would have an s of its own, the same shapes in all channels, or
+    /// weights a rounding beyond the energy limit.
+    fn evaluates(&self) -> bool {
+        let FitOptions { robust, per_channel, conserve_energy, .. } = self.options;
+        robust.is_some() || per_channel || conserve_energy
+    }
+
+    /// The rmse over all samples of a material: else that of a fit which holds every parameter.
     fn rmse(&self, material: &Material) -> Result<f64, ChainError> {
+        if self.evaluates() {
+            return Ok(rmse_of(self.measurement, material, &self.options, &self.scales)?);
+        }
         let model =
             material.model().parse().map_err(|e: crate::brdf::SpecError| ChainError::Mismatch(e.to_string()))?;
         let options = FitOptions { limits: held(material), model, ..self.options.clone() };
@@ -95,8 +114,19 @@ impl<'a> Yardstick<'a> {
                 .map_or(String::new(), |s| format!(", the lowest minimum from {} of {} starts", s.reached, s.starts));
             format!("{} fitted to all {samples} samples: rmse {:.4e}{sure}", w.model, w.rmse)
         };
-        self.whole.iter().map(of).collect()
+        let judged = self.options.robust.map(|robust| {
+            let s: Vec<String> = self.scales.iter().map(|s| format!("{s:.4e}")).collect();
+            format!("all fits are judged by {robust} with the s of one of these, {}", s.join(", "))
+        });
+        self.whole.iter().map(of).chain(judged).collect()
     }
+}
+
+/// The least s of these fits, one for each group of channels; none without a robust loss.
+fn least_scales(whole: &[Whole]) -> Vec<f64> {
+    let scales = whole.iter().filter_map(|w| Some(&w.material.fit.as_ref()?.robust_scale));
+    let least = scales.min_by(|a, b| a.iter().sum::<f64>().total_cmp(&b.iter().sum()));
+    least.cloned().unwrap_or_default()
 }
 
 /// Every parameter held where the material has it.
