@@ -27,6 +27,31 @@ pub(super) struct Subset {
     pub out_of_time: bool,
 }
 
+/// When work has to end, where it has to. It is looked at between the parts of a fit: what is under way is finished, what only makes the answer surer is
+/// not begun.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Deadline(Option<Instant>);
+
+impl Deadline {
+    /// No end.
+    pub const NEVER: Self = Self(None);
+
+    /// At the end of a time that began at `clock`.
+    pub fn of(clock: Instant, time: Option<Duration>) -> Self {
+        Self(time.and_then(|time| clock.checked_add(time)))
+    }
+
+    /// Whether it is past.
+    pub fn is_past(self) -> bool {
+        self.0.is_some_and(|end| Instant::now() >= end)
+    }
+
+    /// The end.
+    pub fn end(self) -> Option<Instant> {
+        self.0
+    }
+}
+
 /// Each round takes so many times the samples of the one before.
 const GROWTH: usize = 4;
 /// Fewer entries than this are not worth thinning out.
@@ -54,6 +79,7 @@ pub(super) fn fit(
     time: Option<Duration>,
 ) -> Result<Part, FitError> {
     let clock = Instant::now();
+    let deadline = Deadline::of(clock, time);
     let whole_is_quick = whole_is_quick(measurement, options);
     let mut thin = if measurement.len() < WORTH { 1 } else { (measurement.len() / FIRST).max(1) };
     let mut before: Option<Part> = None;
@@ -66,7 +92,7 @@ pub(super) fn fit(
         }
         let (mut samples, transforms) = gathered?;
         samples.are_drawn = thin > 1;
-        let part = part::fit(&samples, transforms, model, ranges, options);
+        let part = part::fit(&samples, transforms, model, ranges, options, deadline);
         if let Err(error) = timed::check(options) {
             // The round before this one is what the time was enough for.
             return before.map(Part::out_of_time).ok_or(error);
@@ -89,8 +115,7 @@ pub(super) fn fit(
                 continue;
             }
         }
-        let deadline = time.and_then(|time| clock.checked_add(time));
-        part.bootstrap = bootstrap::bootstrap(listed.as_ref(), &part, model, ranges, options, deadline)?;
+        part.bootstrap = bootstrap::bootstrap(listed.as_ref(), &part, model, ranges, options, deadline.end())?;
         return timed::check(options).map(|()| part);
     }
 }
@@ -103,6 +128,8 @@ impl Part {
     }
 }
 
+/// What is done however little time there is.
+const FIRST_ROUND: &str = "a first round of samples, one descent and its standard errors";
 /// A budget that is exceeded by less is not worth a word.
 const WORD: f64 = 1.02;
 
@@ -119,13 +146,22 @@ pub(super) fn tell(record: &mut FitRecord, parts: &[Part], options: &FitOptions,
             ));
         }
     }
+    if parts.iter().any(|p| p.report.cut) {
+        record
+            .warnings
+            .push("the time ended the search early: other minima were not looked for, or not followed".into());
+    }
+    if parts.iter().any(|p| p.lacks_profiles) {
+        let said = "the time left out profiles: where intervals need one they are estimate ± t·σ, which may be too short there";
+        record.warnings.push(said.into());
+    }
     if let Some(budget) = options.time_budget.filter(|budget| elapsed > budget.mul_f64(WORD)) {
         let least = match options.bootstrap {
-            Some(_) => format!("a first round and {} drawings always run", bootstrap::LEAST),
-            None => "a first round always runs".into(),
+            Some(_) => format!("{FIRST_ROUND} and {} drawings", bootstrap::LEAST),
+            None => FIRST_ROUND.into(),
         };
         record.warnings.push(format!(
-            "the fit took {}, {} more than its time budget: {least}",
+            "the fit took {}, {} more than its time budget: {least} always run",
             in_words(elapsed),
             in_words(elapsed.saturating_sub(budget))
         ));

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
+use super::budget::Deadline;
 use super::limits::{Limit, Ranges};
 use super::loss::{Robust, RobustKind};
 use super::options::{FitError, FitOptions};
@@ -201,7 +202,7 @@ fn candidate(
         let (samples, _) = Samples::gather(measurement, &model, options, group, thin)?;
         let samples = samples.listed(|_| true);
         let unit = options.loss.cost_unit(samples.scale);
-        let whole = part::fit(&samples, None, &model, &ranges, options)?;
+        let whole = part::fit(&samples, None, &model, &ranges, options, Deadline::NEVER)?;
         own.push(whole.saturation);
         let saturation = common.as_ref().map_or(whole.saturation, |list| list[k]);
         let cost_on = |at: &Solution, on: &Samples<'_>| unit * cost(at, on, saturation.zip(options.robust));

@@ -78,6 +78,7 @@ fn shaped(problem: &Problem<'_>, material: &Material, channel: usize) -> Vec<Sha
 
 /// The weights of each of these channels, in the fit's scale.
 fn weights(material: &Material, channels: &[usize], scale: f64) -> Vec<DVector<f64>> {
-    let of = |c: &usize| DVector::from_iterator(material.lobes.len(), material.lobes.iter().map(|l| l.weight[*c] / scale));
+    let of =
+        |c: &usize| DVector::from_iterator(material.lobes.len(), material.lobes.iter().map(|l| l.weight[*c] / scale));
     channels.iter().map(of).collect()
 }

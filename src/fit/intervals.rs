@@ -6,6 +6,7 @@
 
 use std::cell::RefCell;
 
+use super::budget::Deadline;
 use super::covariance::{Interval, Uncertainty};
 use super::joint;
 use super::part::{ROUNDING, SMALL};
@@ -15,6 +16,22 @@ use super::solver;
 
 /// Intervals of all parameters, in the uncertainty's order: weights in the fit's scale, shapes as t = ln(shape).
 pub(super) type Intervals = Vec<Option<Interval>>;
+
+/// Intervals, and what profiles met on the way.
+pub(super) struct Profiled {
+    pub intervals: Intervals,
+    /// A point lower than the estimate, and so of another valley.
+    pub lower: Option<Solution>,
+    /// Whether the time left out profiles that intervals should have been read off.
+    pub is_cut: bool,
+}
+
+impl Profiled {
+    /// [`plain`] ones.
+    pub fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertainty) -> Self {
+        Self { intervals: plain(problem, at, uncertainty), lower: None, is_cut: false }
+    }
+}
 
 /// Below this half width of ln(shape) the profile is as good as a parabola.
 const NARROW: f64 = 0.03;
@@ -54,29 +71,31 @@ pub(super) fn plain(problem: &Problem<'_>, at: &Solution, uncertainty: &Uncertai
 /// [`plain`], by profile where that differs, the transforms knowing the cost.
 pub(super) fn by_search(search: &Search<'_>, at: &Solution, uncertainty: &Uncertainty) -> Intervals {
     let resolved = RESOLVED * search.energy.iter().sum::<f64>();
-    let fine = Fineness { resolved, tolerance: CLOSE, tries: TRIES };
-    profiled(search.problem, at, uncertainty, fine, |i, _| Box::new(move |value| least_cost(search, at, i, value)))
+    let fine = Fineness { resolved, tolerance: CLOSE, tries: TRIES, deadline: Deadline::NEVER };
+    profiled(search.problem, at, uncertainty, fine, |i, _| Box::new(move |value| least_cost(search, at, i, value))).0
 }
 
 /// [`plain`], by profile where that differs, by passes over the samples: few on a large table. Where a profile meets a point lower than the
-/// estimate, and so another valley, that point too, and the other profiles are left out; all are followed unless `stops_at_lower`.
+/// estimate, and so another valley, that point too, and the other profiles are left out; all are followed unless `stops_at_lower`. None is begun after
+/// `deadline`.
 pub(super) fn by_passes(
     problem: &Problem<'_>,
     at: &Solution,
     uncertainty: &Uncertainty,
     stops_at_lower: bool,
-) -> (Intervals, Option<Solution>) {
+    deadline: Deadline,
+) -> Profiled {
     let residuals = problem.samples.residuals();
     let is_large = residuals > SMALL;
     let is_rounding = at.cost <= ROUNDING * ROUNDING * residuals as f64;
     if is_rounding || is_large && (problem.cap.is_some() || !joint::has_few_parameters(problem)) {
-        return (plain(problem, at, uncertainty), None);
+        return Profiled::plain(problem, at, uncertainty);
     }
     let (tolerance, tries) =
         if problem.samples.want_last_digits() { (CLOSE, TRIES) } else { (CLOSE_LARGE, TRIES_LARGE) };
-    let fine = Fineness { resolved: RESOLVED * at.cost, tolerance, tries };
+    let fine = Fineness { resolved: RESOLVED * at.cost, tolerance, tries, deadline };
     let lower = RefCell::new(None);
-    let intervals = profiled(problem, at, uncertainty, fine, |i, rise| {
+    let (intervals, is_cut) = profiled(problem, at, uncertainty, fine, |i, rise| {
         let mut trail = Trail::new(problem, at, &uncertainty.bread, i, 0.1 * tolerance * rise);
         let lower = &lower;
         Box::new(move |value| {
@@ -88,21 +107,23 @@ pub(super) fn by_passes(
             cost
         })
     });
-    (intervals, lower.into_inner())
+    Profiled { intervals, lower: lower.into_inner(), is_cut }
 }
 
 /// The least cost as a function of one parameter's value.
 type Along<'a> = Box<dyn FnMut(f64) -> f64 + 'a>;
 
-/// [`plain`], by profile where that differs. `along` is given a parameter and the rise that is looked for, and begins at the estimate.
+/// [`plain`], by profile where that differs, and whether some of those were too late. `along` is given a parameter and the rise that is looked for, and
+/// begins at the estimate.
 fn profiled<'a>(
     problem: &Problem<'_>,
     at: &Solution,
     uncertainty: &Uncertainty,
     fine: Fineness,
     along: impl Fn(usize, f64) -> Along<'a>,
-) -> Intervals {
+) -> (Intervals, bool) {
     let mut intervals = plain(problem, at, uncertainty);
+    let mut is_cut = false;
     for (i, interval) in intervals.iter_mut().enumerate() {
         let Some(reach) = uncertainty.half_width(i) else { continue };
         let (value, (low, high)) = parameter(problem, at, i);
@@ -111,6 +132,10 @@ fn profiled<'a>(
         if low == high || !is_resolved || !differs(problem, at, uncertainty, i) {
             continue;
         }
+        if fine.deadline.is_past() {
+            is_cut = true;
+            break;
+        }
         let end = |guess: f64, limit: f64| {
             Profile { cost: along(i, rise), least: at.cost.max(0.0), rise, fine }.end(value, guess, limit)
         };
@@ -118,7 +143,7 @@ fn profiled<'a>(
         let above = end((value + reach).min(high).max(value), high);
         *interval = below.zip(above).or(*interval);
     }
-    intervals
+    (intervals, is_cut)
 }
 
 /// Whether the profile of parameter `i` may differ from a parabola.
@@ -168,6 +193,8 @@ struct Fineness {
     tolerance: f64,
     /// Steps outwards, and then inwards, at most.
     tries: usize,
+    /// None is begun after that.
+    deadline: Deadline,
 }
 
 /// The cost along one parameter.

@@ -149,7 +149,7 @@ fn fit_part(
     let thin = Thin { step: options.part, run: 1 };
     let (mut samples, transforms) = Samples::gather(measurement, model, options, channels, thin)?;
     samples.are_drawn = options.part > 1;
-    let mut part = part::fit(&samples, transforms, model, ranges, options)?;
+    let mut part = part::fit(&samples, transforms, model, ranges, options, budget::Deadline::NEVER)?;
     part.bootstrap =
         bootstrap::bootstrap(bootstrap::listed(&samples, options).as_ref(), &part, model, ranges, options, None)?;
     Ok(part)

@@ -3,10 +3,10 @@
 use nalgebra::DVector;
 
 use super::bootstrap::Redrawn;
-use super::budget::Subset;
+use super::budget::{Deadline, Subset};
 use super::covariance::{self, Uncertainty};
 use super::identify;
-use super::intervals::{self, Intervals};
+use super::intervals::{self, Intervals, Profiled};
 use super::joint::{self, Digits};
 use super::limits::Ranges;
 use super::options::{FitError, FitOptions};
@@ -56,9 +56,16 @@ pub(super) struct Part {
     pub subset: Option<Subset>,
     /// What redrawn data say, where they were asked.
     pub bootstrap: Option<Redrawn>,
+    /// Whether the time left out profiles of which intervals would have been read.
+    pub lacks_profiles: bool,
 }
 
 impl Part {
+    /// Whether the time left something out.
+    pub fn is_cut(&self) -> bool {
+        self.report.cut || self.lacks_profiles
+    }
+
     /// What stands for channels without a valid sample, each fitted alone: no weight that is not demanded, nothing determined that is not
     /// held, and shapes and scales as in this fit of another channel.
     pub fn dark(&self, channels: &[usize], ranges: &Ranges) -> Self {
@@ -97,13 +104,14 @@ pub(super) const SMALL: usize = 200_000;
 /// An rmse below this, in the fit's scale, is rounding: nothing can be said of its structure.
 pub(super) const ROUNDING: f64 = 1e-13;
 
-/// Fits the samples.
+/// Fits the samples; what only makes the answer surer is not begun after `deadline`.
 pub(super) fn fit(
     samples: &Samples<'_>,
     transforms: Option<Transforms>,
     model: &ModelSpec,
     ranges: &Ranges,
     options: &FitOptions,
+    deadline: Deadline,
 ) -> Result<Part, FitError> {
     let problem = Problem::new(samples, model, ranges, options.conserve_energy);
     problem.check(&samples.measurement.channels)?;
@@ -112,7 +120,7 @@ pub(super) fn fit(
         let search = Search::new(&problem, &transform, &energy);
         return by_search(&search, options);
     }
-    by_passes(&problem, options)
+    by_passes(&problem, options, deadline)
 }
 
 /// The same model on other samples, from shapes known to be near, as `like` has them: its solution alone.
@@ -192,7 +200,7 @@ const START_SAMPLES: usize = 6000;
 const FIRST_SAMPLES: usize = 600;
 
 /// Any other loss: passes over the samples, the start from a part of them.
-fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitError> {
+fn by_passes(problem: &Problem<'_>, options: &FitOptions, deadline: Deadline) -> Result<Part, FitError> {
     let samples = problem.samples;
     let thinned = |count: usize| {
         let step = samples.len().div_ceil(count).max(1);
@@ -200,26 +208,37 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions) -> Result<Part, FitErr
     };
     let (few, more) = (thinned(FIRST_SAMPLES), thinned(START_SAMPLES));
     let (few, more, mut problem) = (problem.on(&few), problem.on(&more), problem.on(samples));
-    let mut found = start::search_plain(&problem, (&few, &more), options.max_iterations)?;
+    let mut found = start::search_plain(&problem, (&few, &more), options.max_iterations, deadline)?;
     let mut solution = Streamed::new(&problem).solve(found.outcome.parameters.as_slice());
     let mut met = true;
     if let Some(robust) = options.robust {
-        (solution, met, found.report) = robust::settle(&mut problem, (&few, &more), solution, robust, options)?;
+        let plain_cut = found.report.cut;
+        (solution, met, found.report) =
+            robust::settle(&mut problem, (&few, &more), &solution, (robust, options), deadline)?;
+        found.report.cut |= plain_cut;
     }
-    let mut judged = judge(&problem, &more, &start::ordered(&problem, solution), options)?;
+    let mut judged = judge(&problem, &more, &start::ordered(&problem, solution), options, deadline)?;
     for _ in 0..VALLEYS {
         let Some(lower) = judged.lower.clone() else { break };
-        let Some(moved) = robust::resettle(&problem, (&judged.solution, met), lower, options) else { break };
+        if deadline.is_past() {
+            found.report.cut = true;
+            break;
+        }
+        let near = (&judged.solution, met);
+        let Some(moved) = robust::resettle(&problem, near, lower, options, deadline) else { break };
         (problem.saturation, met) = (moved.saturation, moved.met);
-        judged = judge(&problem, &more, &start::ordered(&problem, moved.at), options)?;
+        judged = judge(&problem, &more, &start::ordered(&problem, moved.at), options, deadline)?;
     }
     if judged.lower.is_some() {
         // It stays here all the same: the profiles that were cut short there are followed.
-        judged.intervals = intervals::by_passes(&problem, &judged.solution, &judged.uncertainty, false).0;
+        let all = intervals::by_passes(&problem, &judged.solution, &judged.uncertainty, false, deadline);
+        (judged.intervals, judged.lacks_profiles) = (all.intervals, all.is_cut);
     }
     let unsettled = if met { None } else { robust::left(&problem, &judged.solution, options) };
     found.outcome = judged.outcome;
-    Ok(Part { unsettled, ..finish(&problem, judged.solution, judged.uncertainty, judged.intervals, found)? })
+    let lacks_profiles = judged.lacks_profiles;
+    let part = finish(&problem, judged.solution, judged.uncertainty, judged.intervals, found)?;
+    Ok(Part { unsettled, lacks_profiles, ..part })
 }
 
 /// Valleys that a fit moves on to at most, each lower than the last, when the profile of a parameter meets them.
@@ -233,6 +252,8 @@ struct Judged {
     intervals: Intervals,
     /// A point of another valley that is lower.
     lower: Option<Solution>,
+    /// Whether the time left out profiles that intervals are read off.
+    lacks_profiles: bool,
 }
 
 /// The minimum next to a solution and what there is to say of it; `more` is the same problem on a part of the samples.
@@ -241,6 +262,7 @@ fn judge(
     more: &Problem<'_>,
     start: &Solution,
     options: &FitOptions,
+    deadline: Deadline,
 ) -> Result<Judged, FitError> {
     let (solution, outcome) = descend(problem, start, options.max_iterations, Digits::All)?;
     let mut uncertainty = covariance::uncertainty(problem, &solution, None, options.robust);
@@ -248,12 +270,13 @@ fn judge(
     part.saturation = problem.saturation;
     identify::by_passes(&part, &solution, &mut uncertainty);
     let solution = Solution { cost: uncertainty.cost, ..solution };
-    let (intervals, lower) = if options.profiles {
-        intervals::by_passes(problem, &solution, &uncertainty, true)
+    let found = if options.profiles {
+        intervals::by_passes(problem, &solution, &uncertainty, true, deadline)
     } else {
-        (intervals::plain(problem, &solution, &uncertainty), None)
+        Profiled::plain(problem, &solution, &uncertainty)
     };
-    Ok(Judged { solution, outcome, uncertainty, intervals, lower })
+    let Profiled { intervals, lower, is_cut: lacks_profiles } = found;
+    Ok(Judged { solution, outcome, uncertainty, intervals, lower, lacks_profiles })
 }
 
 /// The minimum next to a solution, on all samples, to its last digits or roughly.
@@ -354,5 +377,6 @@ fn finish(
         intervals,
         subset: None,
         bootstrap: None,
+        lacks_profiles: false,
     })
 }

@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::budget::Deadline;
 use super::options::FitError;
 use super::passes::{self, ShapedLobe};
 use super::quadratic::{Feasible, Quadratic};
@@ -38,6 +39,8 @@ pub(super) struct SearchReport {
     /// Chance that one more random start would find a minimum not seen before (Boender & Rinnooy Kan 1987); none where the lattice itself
     /// brackets the minima of the one shape.
     pub unseen: Option<f64>,
+    /// Whether the time left some starts out.
+    pub cut: bool,
 }
 
 /// The lowest minimum, and how it was found.
@@ -192,9 +195,15 @@ fn rising(problem: &Problem<'_>, t: &[f64]) -> Option<Vec<usize>> {
 /// Starts polished of a problem that takes passes.
 const STREAMED_STARTS: usize = 4;
 
-/// The lowest minimum of a problem that takes passes over its samples: the lattice on `few` of them, its best nodes polished on `more`.
-pub(super) fn search_streamed(few: &Problem<'_>, more: &Problem<'_>, steps: u64) -> Result<Found, FitError> {
-    let starts = if few.layout.is_empty() {
+/// The lowest minimum of a problem that takes passes over its samples: the lattice on `few` of them, its best nodes polished on `more`, the very best alone
+/// where it is late.
+pub(super) fn search_streamed(
+    few: &Problem<'_>,
+    more: &Problem<'_>,
+    steps: u64,
+    deadline: Deadline,
+) -> Result<Found, FitError> {
+    let mut starts = if few.layout.is_empty() {
         vec![Vec::new()]
     } else {
         let nodes = Nodes::new(few);
@@ -207,10 +216,16 @@ pub(super) fn search_streamed(few: &Problem<'_>, more: &Problem<'_>, steps: u64)
         best.truncate(STREAMED_STARTS);
         best
     };
+    let cut = starts.len() > 1 && deadline.is_past();
+    if cut {
+        starts.truncate(1);
+    }
     let lattice = starts.len();
     let run = |start: &Vec<f64>| polish_start(Streamed::rough(more), more, start.clone(), steps);
     let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
-    best_of(outcomes, lattice)
+    let mut found = best_of(outcomes, lattice)?;
+    found.report.cut = cut;
+    Ok(found)
 }
 
 /// The lowest minimum without a robust loss: from the transforms where they know all sums, else on parts of the samples, few and more.
@@ -218,9 +233,10 @@ pub(super) fn search_plain(
     problem: &Problem<'_>,
     (few, more): (&Problem<'_>, &Problem<'_>),
     steps: u64,
+    deadline: Deadline,
 ) -> Result<Found, FitError> {
     if !problem.is_transformable() {
-        return search_streamed(few, more, steps);
+        return search_streamed(few, more, steps, deadline);
     }
     let (transform, energy) = passes::transform(problem.samples);
     search(&Search::new(problem, &transform, &energy), steps)
@@ -278,6 +294,7 @@ fn best_of(outcomes: Vec<Outcome>, lattice: usize) -> Result<Found, FitError> {
         minima: costs.len(),
         runner_up_excess: costs.get(1).filter(|_| lowest > 0.0).map(|c| c / lowest - 1.0),
         unseen,
+        cut: false,
     };
     let outcome = outcomes.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     outcome.map(|outcome| Found { outcome, report }).ok_or_else(|| FitError::Solver { reason: "no start".into() })

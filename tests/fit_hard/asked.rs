@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use goniofit::brdf::{LobeKind, LobeRecord, Material};
+use goniofit::brdf::{FitRecord, LobeKind, LobeRecord, Material};
 use goniofit::fit::{Bootstrap, FitError, FitOptions, Limit, Loss, RobustKind, fit, fit_best_model};
 use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::{Measurement, Weights};
@@ -443,6 +443,52 @@ fn a_time_budget_ends_early_and_says_how_far_it_got() {
     // A target met by nothing but all samples gives the fit to all.
     let exact = fitted(m, &FitOptions { target_rmse_excess: Some(1e-9), ..options("lambert+phong") }).material;
     assert_eq!((parameters(&exact), &record(&exact).subset), (parameters(&all), &None));
+}
+
+/// A time that is over before it began leaves one start and one step of the robust scale, no profiles, and says all that; a time that is ample changes no bit. By what
+/// is done, not by the clock.
+#[test]
+fn a_time_budget_binds_losses_that_take_passes() {
+    let m = channel(&three_channels(&HEMISPHERE(15.0)), 0);
+    let says = |r: &FitRecord, words: &str| r.warnings.iter().any(|w| w.contains(words));
+    let losses = [
+        FitOptions { robust: robust(RobustKind::Huber), ..options("lambert+phong") },
+        FitOptions { robust: robust(RobustKind::Cauchy), ..options("lambert+phong+phong") },
+        FitOptions { loss: Loss::Log, ..options("lambert+phong") },
+    ];
+    for o in losses {
+        let timed = |time: Duration| solved(&m, &FitOptions { time_budget: Some(time), ..o.clone() });
+        let (short, long, free) = (timed(Duration::from_nanos(1)), timed(Duration::from_hours(1)), solved(&m, &o));
+        let [s, l, f] = [&short, &long, &free].map(record);
+        assert_eq!((s.status.as_str(), l.status.as_str()), ("budget", f.status.as_str()), "{o:?}");
+        let starts = |r: &FitRecord| r.search.as_ref().expect("a search").starts;
+        assert!(starts(s) == 1 && starts(f) > 1, "{} of {}: {o:?}", starts(s), starts(f));
+        assert!(says(s, "the time ended the search early") && says(s, "one descent and its standard errors"), "{s:?}");
+        assert!(!says(l, "the time") && !says(f, "the time"), "{l:?}");
+        assert_eq!(parameters(&long), parameters(&free));
+        // A fit all the same, of the same data: its errors are the same but for the robust scale.
+        assert!(short.lobes.iter().zip(&free.lobes).all(|(a, b)| a.kind == b.kind), "{short:?}");
+        assert!((s.rmse / f.rmse - 1.0).abs() < 0.2, "{} of {}", s.rmse, f.rmse);
+    }
+}
+
+/// Where a parameter is so uncertain that only a profile tells its interval, a time that is over leaves that out too.
+#[test]
+fn a_time_budget_leaves_out_profiles_and_says_so() {
+    // Noise of a tenth at the peak of a few readings: the exponent is known to some per cent.
+    let truth = material(&[0.3], &[0.2], 40.0);
+    let scan = part_of(&HEMISPHERE(15.0), |wi, wo| cos_alpha(wi, wo) > 0.9);
+    let m = measure(&truth, &Instrument { electrons: 100.0, ..Instrument::default() }, &scan, 5);
+    let o = FitOptions { loss: Loss::Log, ..options("lambert+phong") };
+    let free = solved(&m, &o);
+    let short = solved(&m, &FitOptions { time_budget: Some(Duration::from_nanos(1)), ..o });
+    let (n, shape) =
+        (record(&free).standard_error[1].shape[0].1.get(0), free.lobes[1].shape_of(0).expect("a shape")[0]);
+    assert!(n.flatten().is_some_and(|error| 1.9 * error > 0.03 * shape), "{n:?} of {shape}: no parabola does");
+    assert!(record(&short).warnings.iter().any(|w| w.contains("the time left out profiles")), "{short:?}");
+    assert!(record(&free).warnings.iter().all(|w| !w.contains("the time")), "{free:?}");
+    let pairs = parameters(&short).into_iter().zip(parameters(&free));
+    pairs.for_each(|(a, b)| assert!(rel(a, b) < 1e-6, "{a} and {b}: one start is enough here"));
 }
 
 /// Without a budget the comparison takes a hundred times as long as the fit; with one, half of it at most where one model can be looked at.

@@ -255,7 +255,7 @@ impl Facts<'_> {
             };
             p.layout.iter().enumerate().any(|(i, (lobe, _))| ends(i) && p.lit(*lobe))
         };
-        if self.parts.iter().any(|p| p.subset.is_some_and(|s| s.out_of_time)) {
+        if self.parts.iter().any(|p| p.is_cut() || p.subset.is_some_and(|s| s.out_of_time)) {
             "budget"
         } else if self.parts.iter().any(|p| matches!(p.stop, Stop::MaxIterations)) {
             "max-iterations"

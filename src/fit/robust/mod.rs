@@ -10,6 +10,7 @@ mod spread;
 mod starts;
 mod way;
 
+use super::budget::Deadline;
 use super::joint::Digits;
 use super::loss::Robust;
 use super::options::{FitError, FitOptions};
@@ -44,18 +45,20 @@ const LARGE: Aim = Aim { tolerance: 1e-7, digits: Digits::Rough };
 const ROUGHLY: Aim = Aim { tolerance: 1e-3, digits: Digits::Rough };
 
 /// The parameters at the s that their residuals ask for, starting from the plain loss's fit and from elsewhere, whether the two met, and how
-/// they were looked for; sets the problem's s. `few` and `more` are the same problem on parts of the samples, which say where to begin.
+/// they were looked for; sets the problem's s. `few` and `more` are the same problem on parts of the samples, which say where to begin. After
+/// `deadline` only the way from the plain fit is gone, as far as one step leads.
 pub(super) fn settle(
     problem: &mut Problem<'_>,
     (few, more): (&Problem<'_>, &Problem<'_>),
-    plain: Solution,
-    robust: Robust,
-    options: &FitOptions,
+    plain: &Solution,
+    (robust, options): (Robust, &FitOptions),
+    deadline: Deadline,
 ) -> Result<(Solution, bool, SearchReport), FitError> {
-    let settling = Settling::new(problem, &plain, robust, options);
-    let (begun, report) = settling.begin(few, more, plain)?;
+    let settling = Settling::new(problem, plain, (robust, options), deadline);
+    let (begun, mut report) = settling.begin(few, more, plain)?;
     problem.saturation = begun.saturation;
     let (at, met) = settling.follow(problem, begun.at, aim(problem))?;
+    report.cut |= !met && deadline.is_past();
     Ok((at, met, report))
 }
 
@@ -74,9 +77,10 @@ pub(super) fn resettle(
     here: (&Solution, bool),
     near: Solution,
     options: &FitOptions,
+    deadline: Deadline,
 ) -> Option<Robustly> {
     let Some(robust) = options.robust else { return Some(Robustly { at: near, saturation: None, met: true }) };
-    let settling = Settling::new(problem, &near, robust, options);
+    let settling = Settling::new(problem, &near, (robust, options), deadline);
     let mut there = problem.on(problem.samples);
     there.saturation = problem.saturation;
     let at = descend(&there, &near, options.max_iterations, Digits::Rough).ok()?.0;
@@ -91,7 +95,7 @@ pub(super) fn resettle(
 /// ln(the s that the residuals ask for / the problem's s), where that is worth a word.
 pub(super) fn left(problem: &Problem<'_>, at: &Solution, options: &FitOptions) -> Option<f64> {
     let (robust, (_, s)) = options.robust.zip(problem.saturation)?;
-    let left = (Settling::new(problem, at, robust, options).asked(problem, at) / s).ln();
+    let left = (Settling::new(problem, at, (robust, options), Deadline::NEVER).asked(problem, at) / s).ln();
     Some(left).filter(|left| left.abs() > UNSETTLED)
 }
 
@@ -112,15 +116,22 @@ struct Settling {
     rounding: f64,
     /// The value that a good part of the data have, if any.
     common: Option<f64>,
+    /// When it has to end.
+    deadline: Deadline,
 }
 
 impl Settling {
-    fn new(problem: &Problem<'_>, like: &Solution, robust: Robust, options: &FitOptions) -> Self {
+    fn new(
+        problem: &Problem<'_>,
+        like: &Solution,
+        (robust, options): (Robust, &FitOptions),
+        deadline: Deadline,
+    ) -> Self {
         let (typical, rounding) = sizes(problem.samples, like);
         let values = spread::sorted_values(problem);
         let rounding = rounding.max(typical * spread::rounding_share(&values, problem));
         let common = spread::common_value(&values);
-        Self { robust, steps: options.max_iterations, typical, rounding, common }
+        Self { robust, steps: options.max_iterations, typical, rounding, common, deadline }
     }
 
     /// Follows s roughly.
@@ -138,7 +149,7 @@ impl Settling {
     }
 
     /// Brings ln(new s) − ln(old s) to 0 by secants, within the bracket that is known; the parameters follow. Says
-    /// whether it got there within [`ROUNDS`].
+    /// whether it got there within [`ROUNDS`], none of which is begun after the deadline.
     fn follow(&self, problem: &mut Problem<'_>, start: Solution, aim: Aim) -> Result<(Solution, bool), FitError> {
         let mut at = start;
         let mut s = problem.saturation.map_or(1.0, |(_, s)| s);
@@ -146,6 +157,9 @@ impl Settling {
         for _ in 0..ROUNDS {
             let excess = (self.asked(problem, &at) / s).ln();
             if excess.abs() > aim.tolerance {
+                if self.deadline.is_past() {
+                    break;
+                }
                 s = way.next(s.ln(), excess).exp();
                 problem.saturation = Some((self.robust.kind, s));
                 at = descend(problem, &at, self.steps, aim.digits)?.0;

@@ -1,5 +1,7 @@
 //! Where a robust fit begins: at the plain fit, at the model with a lobe fewer, on a lattice of exponents.
 
+use std::cell::Cell;
+
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -30,18 +32,27 @@ const FEWEST_RESIDUALS: usize = 5;
 
 impl Settling {
     /// Where to begin, from the parts of the samples: from the plain fit, from a lattice, or from the model with a lobe fewer. One of them
-    /// must lead somewhere.
+    /// must lead somewhere. What would be begun after the deadline is left out, the way from the plain fit last.
     pub(super) fn begin(
         &self,
         few: &Problem<'_>,
         more: &Problem<'_>,
-        plain: Solution,
+        plain: &Solution,
     ) -> Result<(Candidate, SearchReport), FitError> {
-        let smaller = self.smaller(few, more);
         let plain = self.after_plain(few, more, plain);
-        let mut found = self.by_lattice(few, more, smaller.as_ref());
+        // As long as there is no answer the time is not over.
+        let may_end = plain.as_ref().is_ok_and(|candidate| candidate.sigma.is_finite());
+        let cut = Cell::new(false);
+        let is_late = || {
+            let late = may_end && self.deadline.is_past();
+            cut.set(cut.get() || late);
+            late
+        };
+        let smaller = if is_late() { None } else { self.smaller(few, more) };
+        let mut found = if is_late() { Vec::new() } else { self.by_lattice(few, more, smaller.as_ref(), &is_late) };
         // Outliers may hold the plain fit of many lobes where that of few lets them go; of alike ones it is the one to go on from, for its
         // lobes are not two that stand in one place.
+        let smaller = smaller.filter(|_| !is_late());
         let richer = smaller.and_then(|s| self.candidate(more, s.saturation, with_a_lobe_more(more, &s)).ok());
         match plain {
             Ok(plain) => found.insert(0, plain),
@@ -50,18 +61,23 @@ impl Settling {
         }
         found.extend(richer);
         let ranking = Ranking::new(more, self.rounding, found);
-        ranking.settle().ok_or_else(|| FitError::Solver { reason: "no robust fit has finite residuals".into() })
+        let settled = ranking.settle().map(|(best, report)| (best, SearchReport { cut: cut.get(), ..report }));
+        settled.ok_or_else(|| FitError::Solver { reason: "no robust fit has finite residuals".into() })
     }
 
     /// Beginning with the plain fit and its s.
-    fn after_plain(&self, few: &Problem<'_>, more: &Problem<'_>, plain: Solution) -> Result<Candidate, FitError> {
+    fn after_plain(&self, few: &Problem<'_>, more: &Problem<'_>, plain: &Solution) -> Result<Candidate, FitError> {
         let (mut few, mut more) = (few.on(few.samples), more.on(more.samples));
-        let saturation = Some((self.robust.kind, self.asked(&more, &plain)));
+        let saturation = Some((self.robust.kind, self.asked(&more, plain)));
         (few.saturation, more.saturation) = (saturation, saturation);
+        let plain = descend(&more, plain, self.steps, Digits::Rough);
+        if self.deadline.is_past() {
+            return self.candidate(&more, saturation, plain?.0);
+        }
         // Outliers may have drawn the plain fit into another valley: the robust cost has the last word on where to go on.
-        let other = start::search_streamed(&few, &more, self.steps)?;
+        let other = start::search_streamed(&few, &more, self.steps, self.deadline)?;
         let other = Streamed::new(&more).solve(other.outcome.parameters.as_slice());
-        let [plain, other] = [plain, other].map(|start| descend(&more, &start, self.steps, Digits::Rough));
+        let other = descend(&more, &other, self.steps, Digits::Rough);
         let (plain, other) = (plain?.0, other?.0);
         self.candidate(&more, saturation, if other.cost < plain.cost { other } else { plain })
     }
@@ -73,14 +89,20 @@ impl Settling {
         if more.kinds.is_empty() {
             return None;
         }
-        let plain = start::search_plain(&more, (&few, &more), self.steps).ok()?;
+        let plain = start::search_plain(&more, (&few, &more), self.steps, self.deadline).ok()?;
         let plain = Streamed::new(&more).solve(plain.outcome.parameters.as_slice());
-        self.begin(&few, &more, plain).ok().map(|begun| begun.0)
+        self.begin(&few, &more, &plain).ok().map(|begun| begun.0)
     }
 
     /// Beginning with a lattice of the last shape, the others as the model with a lobe fewer has them: its valleys, followed. It knows nothing of
     /// the plain fit; without a smaller model weights and s begin with the data's own size and spread.
-    fn by_lattice(&self, few: &Problem<'_>, more: &Problem<'_>, smaller: Option<&Candidate>) -> Vec<Candidate> {
+    fn by_lattice(
+        &self,
+        few: &Problem<'_>,
+        more: &Problem<'_>,
+        smaller: Option<&Candidate>,
+        is_late: &dyn Fn() -> bool,
+    ) -> Vec<Candidate> {
         if smaller.is_none() && few.layout.len() > 1 {
             return Vec::new(); // there is one, but it has no fit
         }
@@ -98,12 +120,15 @@ impl Settling {
             gentle.at_node(few, s, &from, &t)
         };
         let profile: Vec<Candidate> = start::last_nodes(few).par_iter().map(at_node).collect();
+        if is_late() {
+            return Vec::new();
+        }
         let follow = |valley: Candidate| gentle.descended(few, valley.saturation, &valley.at).ok();
         let ends: Vec<Option<Candidate>> = self.valleys(few, profile).into_par_iter().map(follow).collect();
         let mut ends = Ranking::new(few, self.rounding, ends.into_iter().flatten().collect());
         let mut found = Vec::new();
         for _ in 0..MOST_FOLLOWED {
-            let Some((best, _)) = ends.take() else { break };
+            let Some((best, _)) = ends.take().filter(|_| !is_late()) else { break };
             let Ok(own) = gentle.descended(more, best.saturation, &best.at) else { continue };
             let saturation = Some((self.robust.kind, self.asked(more, &own.at)));
             found.extend(self.descended(more, saturation, &own.at));
