@@ -1,6 +1,6 @@
 //! What is swept: series of settings, what is measured of each, and what theory says.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::knob::Knob;
 
@@ -26,21 +26,41 @@ pub enum Cost {
 }
 
 /// A power of the size that an error follows.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind", content = "slope")]
 pub enum Theory {
     /// This one.
     Exactly(f64),
     /// This one or a steeper one.
     AtMost(f64),
+    /// This one or a flatter one.
+    AtLeast(f64),
+    /// One between a steep one and a flat one, both included.
+    Between(f64, f64),
+    /// None is known: what a law needs is not given.
+    Unknown,
 }
 
 impl Theory {
-    /// The exponent.
+    /// The exponents that it names.
     #[must_use]
-    pub fn slope(self) -> f64 {
+    pub fn slopes(self) -> Vec<f64> {
         match self {
-            Self::Exactly(slope) | Self::AtMost(slope) => slope,
+            Self::Exactly(slope) | Self::AtMost(slope) | Self::AtLeast(slope) => vec![slope],
+            Self::Between(steep, flat) => vec![steep, flat],
+            Self::Unknown => Vec::new(),
+        }
+    }
+
+    /// The exponent in words, numbers written by `number`.
+    #[must_use]
+    pub fn said(self, number: impl Fn(f64) -> String) -> String {
+        match self {
+            Self::Exactly(slope) => number(slope),
+            Self::AtMost(slope) => format!("{} or steeper", number(slope)),
+            Self::AtLeast(slope) => format!("{} or flatter", number(slope)),
+            Self::Between(steep, flat) => format!("{} to {}", number(steep), number(flat)),
+            Self::Unknown => "none".into(),
         }
     }
 }
@@ -48,7 +68,7 @@ impl Theory {
 /// What theory says of a measure, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Law {
-    /// The exponent.
+    /// The exponent, if there is one.
     pub theory: Theory,
     /// Why.
     pub why: &'static str,

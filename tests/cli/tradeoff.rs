@@ -26,6 +26,17 @@ fn slope(found: &Value, curve_name: &str, name: &str) -> f64 {
     number(&slopes.iter().find(|s| s["measure"] == name).expect("a slope")["slope"]["value"])
 }
 
+/// What theory says of a slope: its kind, and the exponents that it names.
+fn theory(found: &Value, curve_name: &str, name: &str) -> (String, Vec<f64>) {
+    let slopes = curve(found, curve_name)["slopes"].as_array().expect("slopes");
+    let theory = &slopes.iter().find(|s| s["measure"] == name).expect("a slope")["law"]["theory"];
+    let slopes = match &theory["slope"] {
+        Value::Array(list) => list.iter().map(number).collect(),
+        slope => slope.as_f64().into_iter().collect(),
+    };
+    (theory["kind"].as_str().expect("a kind").to_owned(), slopes)
+}
+
 /// The words of a command line.
 fn typed(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
@@ -50,6 +61,8 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     let [parameters, of_cost] = ["parameters", "excess"].map(|name| slope(&found, "lambert+phong", name));
     // Of 24 trials each an error is known to 10 to 15 %, and the sizes differ by a factor of 4: the slope to about 0.1, of the square twice that.
     assert!((parameters + 0.5).abs() < 0.2 && (of_cost + 1.0).abs() < 0.4, "{parameters} and {of_cost}");
+    assert_eq!(theory(&found, "lambert+phong", "excess"), ("exactly".into(), vec![-1.0]), "noise, and no more");
+    assert_eq!(theory(&found, "lambert+phong", "parameters"), ("exactly".into(), vec![-0.5]));
     let target = &curve(&found, "lambert+phong, as many as a target takes")["points"][0];
     assert_eq!(target["kept"], 24);
     for name in ["tradeoff.csv", "tradeoff.json", "excess-time.svg", "excess-time.png", "parameters-part.svg"] {
@@ -101,7 +114,10 @@ fn a_sweep_of_fits_takes_what_a_fit_takes_and_says_it_again() {
     assert_eq!((&fit["fit"]["weights"], &fit["fit"]["robust"]), (&"sigma".into(), &"huber:1.345".into()));
     let reference = found["reference"].to_string();
     let rmse = format!("rmse {:.4e}", number(&fit["fit"]["rmse"]));
-    assert!(reference.contains(&rmse) && reference.contains("all fits are judged by huber:1.345"), "{rmse}: {reference}");
+    assert!(
+        reference.contains(&rmse) && reference.contains("all fits are judged by huber:1.345"),
+        "{rmse}: {reference}"
+    );
     let plain = b.json(&typed("tradeoff fit m.csv --parts 1,2,4 --targets 5% --trials 3"));
     assert_ne!(timeless(&plain), timeless(&found));
     let excess = errors(&found, "lambert+phong", "excess");
@@ -110,7 +126,8 @@ fn a_sweep_of_fits_takes_what_a_fit_takes_and_says_it_again() {
     assert!(text.contains(again), "{text}");
     follow(&b, &text, 1);
     // Each channel apart, with shapes of its own.
-    let args = typed("tradeoff fit m.csv --per-channel --fix lambert.weight[r]=0.2 --parts 1,3 --targets 5% --trials 2");
+    let args =
+        typed("tradeoff fit m.csv --per-channel --fix lambert.weight[r]=0.2 --parts 1,3 --targets 5% --trials 2");
     let found = b.json(&args);
     assert!(found["commands"].to_string().contains(r#""--per-channel","--fix","lambert.weight[r]=0.2""#), "{found}");
     let excess = errors(&found, "lambert+phong", "excess");
@@ -153,10 +170,46 @@ fn readings_average_out_and_take_the_instruments_time() {
         let slope = slope(&found, "readings averaged", name);
         let most = if name == "parameters" { 0.15 } else { 0.05 };
         assert!((slope + 0.5).abs() < most, "{name}: {slope}");
+        assert_eq!(theory(&found, "readings averaged", name), ("exactly".into(), vec![-0.5]), "{name}");
     }
     let points = curve(&found, "readings averaged")["points"].as_array().expect("points");
     let times: Vec<f64> = points.iter().map(|p| number(&p["instrument_s"])).collect();
     assert!((times[2] / times[0] - 16.0).abs() < 1e-9, "{times:?}");
+}
+
+/// Where what theory needs is not given it is a bound, or none, and the reason is said.
+#[test]
+fn theory_is_stated_where_it_holds() {
+    let b = Bench::new();
+    b.paint("paint.csv");
+    // A gloss paint without its gloss: what is left is no noise.
+    let found = b.json(&typed("tradeoff fit paint.csv --models lambert --parts 1,10,20,40 --targets 1% --trials 4"));
+    assert_eq!(theory(&found, "lambert", "excess"), ("unknown".into(), vec![]));
+    let why = curve(&found, "lambert")["slopes"][0]["law"]["why"].as_str().expect("a reason");
+    assert!(why.contains("the model's own error"), "{why}");
+    // Strides may keep step with the rows.
+    let found = b.json(&typed("tradeoff fit paint.csv --strides 40,20,10 --targets 1% --trials 4"));
+    assert_eq!(theory(&found, "lambert+phong, every N-th entry", "parameters"), ("unknown".into(), vec![]));
+    let exposed = |more: &str| {
+        let args = format!(
+            "tradeoff simulate --material satin --scan hemisphere:15 --knobs exposure --exposures 1,2,4 --trials 6 {more}"
+        );
+        let found = b.json(&typed(&args));
+        (slope(&found, "exposure", "reading"), theory(&found, "exposure", "reading"), b.ok(&typed(&args)).text())
+    };
+    // Of thousands of readings, six times, an error is known to 1 %, and of a factor of 4 a slope to 0.01.
+    let (slope, law, text) = exposed("");
+    assert!((-1.03..-0.47).contains(&slope) && law == ("between".into(), vec![-1.0, -0.5]), "{slope} {law:?}");
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("theory -1 to -0.5: shot noise"), "{text}");
+    let (slope, law, _) = exposed("--read-noise 0");
+    assert!((slope + 0.5).abs() < 0.05 && law == ("exactly".into(), vec![-0.5]), "{slope} {law:?}");
+    let (slope, law, _) = exposed("--electrons 300");
+    assert!(slope > -1.03 && law == ("at-least".into(), vec![-1.0]), "readings darker than their noise: {slope} {law:?}");
+    // What readings share bounds their average.
+    let args = "tradeoff simulate --material satin --instrument commercial --scan in-plane:15 --knobs readings --average 1,2,4 --trials 3";
+    let found = b.json(&typed(args));
+    assert_eq!(theory(&found, "readings averaged", "brdf"), ("at-least".into(), vec![-0.5]));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::advice::short;
 use crate::numeric::estimate::Estimate;
-use crate::tradeoff::{Cost, Curve, Point, Slope, Standing, Sweep, Theory};
+use crate::tradeoff::{Cost, Curve, Point, Slope, Standing, Sweep};
 
 /// Columns of the terminal.
 const WIDTH: usize = 80;
@@ -129,10 +129,7 @@ fn reach(e: Estimate) -> String {
 /// A slope beside that of theory, with the reason where it is to be said.
 fn slope_said(curve: &Curve, slope: &Slope, why: Option<&str>) -> String {
     let own = slope.slope;
-    let law = slope.law.map_or(String::new(), |law| match law.theory {
-        Theory::Exactly(theory) => format!("; theory {theory}"),
-        Theory::AtMost(theory) => format!("; theory {theory} or steeper"),
-    });
+    let law = slope.law.map_or(String::new(), |law| format!("; theory {}", law.theory.said(|x| x.to_string())));
     let why = why.map_or(String::new(), |why| format!(": {why}"));
     let reach = 0.5 * (own.high - own.low);
     format!("  {} against {}: slope {:.3} ± {reach:.3}{law}{why}", slope.measure, curve.axis, own.value)

@@ -150,11 +150,10 @@ fn sentence(text: &str) -> String {
     letters.next().map_or(String::new(), |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
 }
 
-/// A slope that theory knows.
+/// A slope that there is theory of, or a reason why there is none.
 fn slope(curve: &str, found: &SweepSlope) -> Option<SlopeRow> {
     let told = |x: f64| minus(&format!("{x:.3}"));
     let law = found.law.as_ref()?;
-    let (theory, may_be_steeper) = law.slope();
     let ends = found.slope.low.zip(found.slope.high);
     let unknown = || "–".to_owned();
     Some(SlopeRow {
@@ -162,7 +161,7 @@ fn slope(curve: &str, found: &SweepSlope) -> Option<SlopeRow> {
         measure: found.measure.clone(),
         slope: found.slope.value.map_or_else(unknown, told),
         interval: ends.map_or_else(unknown, |(low, high)| format!("{} to {}", told(low), told(high))),
-        theory: told(theory) + if may_be_steeper { " or steeper" } else { "" },
+        theory: law.theory.said(told),
         why: law.why.clone(),
     })
 }

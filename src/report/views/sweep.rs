@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope, minus};
+use crate::tradeoff::Theory;
 
 /// What `goniofit tradeoff` measured of a stage, as `tradeoff.json` has it; what is neither drawn nor listed is not read.
 #[derive(Debug, Clone, Deserialize)]
@@ -151,27 +152,10 @@ pub struct SweepSlope {
 /// What theory says of a slope, and why.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Law {
-    theory: Theory,
+    /// The exponent, if there is one.
+    pub theory: Theory,
     /// Why.
     pub why: String,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-#[serde(rename_all = "kebab-case", tag = "kind", content = "slope")]
-enum Theory {
-    Exactly(f64),
-    AtMost(f64),
-}
-
-impl Law {
-    /// The exponent, and whether a steeper one is as good.
-    #[must_use]
-    pub fn slope(&self) -> (f64, bool) {
-        match self.theory {
-            Theory::Exactly(slope) => (slope, false),
-            Theory::AtMost(slope) => (slope, true),
-        }
-    }
 }
 
 /// A plot of a sweep.
@@ -200,7 +184,7 @@ impl Sweep {
     #[must_use]
     pub fn beside_theory(&self) -> Vec<SweepPlot> {
         let known = |knob: &str, measure: &str| {
-            self.curves.iter().any(|c| c.knob == knob && c.main == measure && c.law(measure).is_some())
+            self.curves.iter().any(|c| c.knob == knob && c.main == measure && !c.theory(measure).is_empty())
         };
         let of = |knob| self.against_size(knob, |measure| known(knob, measure));
         self.knobs().into_iter().flat_map(of).collect()
@@ -282,9 +266,10 @@ impl Sweep {
                 if let Some(slope) = curve.slope(&measure.name).and_then(|s| s.slope.value) {
                     of.name = format!("{}, slope {}", of.name, minus(&format!("{slope:.2}")));
                 }
-                let Some((slope, _)) = curve.law(&measure.name).map(Law::slope) else { continue };
-                if !slopes.iter().any(|s| s.slope == slope) {
-                    slopes.push(Slope { name: format!("theory {}", minus(&slope.to_string())), slope, beside });
+                for slope in curve.theory(&measure.name) {
+                    if !slopes.iter().any(|s| s.slope == slope) {
+                        slopes.push(Slope { name: format!("theory {}", minus(&slope.to_string())), slope, beside });
+                    }
                 }
             }
             self.chart(format!("{}-{knob}", measure.name), axis, &measure.name, series, slopes)
@@ -330,8 +315,10 @@ impl SweepCurve {
         self.slopes.iter().find(|s| s.measure == measure)
     }
 
-    fn law(&self, measure: &str) -> Option<&Law> {
-        self.slope(measure).and_then(|s| s.law.as_ref())
+    /// The slopes that theory names for a measure; none where it names none.
+    fn theory(&self, measure: &str) -> Vec<f64> {
+        let law = self.slope(measure).and_then(|s| s.law.as_ref());
+        law.map_or_else(Vec::new, |law| law.theory.slopes())
     }
 
     /// The settings whose error is known to be more than 0.

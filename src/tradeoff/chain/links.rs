@@ -15,7 +15,8 @@ use crate::measurement::{Dimension, Measurement};
 use crate::render::{self, Film, Options, Scene};
 use crate::tradeoff::fit::parameter_error;
 use crate::tradeoff::render::accumulate::Truth;
-use crate::tradeoff::simulate::relative_change;
+use crate::tradeoff::simulate::laws::Shown;
+use crate::tradeoff::simulate::{largest_change, relative_change};
 use crate::tradeoff::sweep::Trial;
 
 /// What is tried.
@@ -27,6 +28,17 @@ pub(super) enum Try {
     Pixels(u32),
     /// Readings, stride and samples: the chain.
     Whole(u32, usize, u32),
+}
+
+/// A material measured and fitted.
+struct Fitted {
+    material: Material,
+    /// Time of the fit, s.
+    seconds: f64,
+    /// Error of what was measured.
+    brdf: f64,
+    /// The largest change of a value.
+    change: f64,
 }
 
 /// Samples of pictures that share their noise.
@@ -80,25 +92,31 @@ impl<'a> Links<'a> {
         Instrument { readings, ..self.what.instrument.clone() }
     }
 
-    pub fn trial(&mut self, what: Try, seed: u64) -> Result<Trial, ChainError> {
+    /// A trial, and what it shows of noise.
+    pub fn trial(&mut self, what: Try, seed: u64) -> Result<(Trial, Shown), ChainError> {
         match what {
             Try::Data(readings, stride) => {
-                let (fitted, seconds, brdf) = self.fitted(readings, stride, seed)?;
+                let Fitted { material: fitted, seconds, brdf, change } = self.fitted(readings, stride, seed)?;
                 let shot = |scene: &Scene| picture(scene, self.what.size, SHARED, seed, self.control.quiet());
                 let own = shot(&scene_with(self.what, &fitted)?)?;
                 let error = own.off_by(&shot(&self.truth_scene)?);
-                Ok(Trial { seconds, errors: vec![error, parameter_error(&fitted, self.what.material), brdf] })
+                let parameters = parameter_error(&fitted, self.what.material);
+                // An error that could not be told is as large as one may be.
+                let off = if parameters.is_nan() { f64::INFINITY } else { parameters };
+                let shown = Shown { change, parameters: off, saturates: false };
+                Ok((Trial { seconds, errors: vec![error, parameters, brdf] }, shown))
             }
             Try::Pixels(samples) => {
                 let film = picture(&self.truth_scene, self.what.size, samples, seed, self.control.quiet())?;
-                Ok(Trial { seconds: film.seconds, errors: vec![self.off(&film.to_image()), f64::NAN, f64::NAN] })
+                let errors = vec![self.off(&film.to_image()), f64::NAN, f64::NAN];
+                Ok((Trial { seconds: film.seconds, errors }, Shown::NOTHING))
             }
             Try::Whole(readings, stride, samples) => {
-                let (fitted, seconds, brdf) = self.fitted(readings, stride, seed)?;
+                let Fitted { material: fitted, seconds, brdf, .. } = self.fitted(readings, stride, seed)?;
                 let film =
                     picture(&scene_with(self.what, &fitted)?, self.what.size, samples, seed, self.control.quiet())?;
                 let errors = vec![self.off(&film.to_image()), parameter_error(&fitted, self.what.material), brdf];
-                Ok(Trial { seconds: seconds + film.seconds, errors })
+                Ok((Trial { seconds: seconds + film.seconds, errors }, Shown::NOTHING))
             }
         }
     }
@@ -108,8 +126,8 @@ impl<'a> Links<'a> {
         self.truth.error(image)
     }
 
-    /// A material measured and fitted, the time of the fit, s, and the error of what was measured.
-    fn fitted(&self, readings: u32, stride: usize, seed: u64) -> Result<(Material, f64, f64), ChainError> {
+    /// A material measured and fitted.
+    fn fitted(&self, readings: u32, stride: usize, seed: u64) -> Result<Fitted, ChainError> {
         let table = measured(self.what, &self.instrument(readings), seed, self.control.quiet())?;
         let options = FitOptions {
             stride,
@@ -118,8 +136,9 @@ impl<'a> Links<'a> {
             ..FitOptions::new(self.what.model.clone())
         };
         let clock = Instant::now();
-        let fitted = fit(&table, &options)?.material;
-        Ok((fitted, clock.elapsed().as_secs_f64(), relative_change(&table.values, &self.ideal)))
+        let material = fit(&table, &options)?.material;
+        let (seconds, change) = (clock.elapsed().as_secs_f64(), largest_change(&table.values, &self.ideal));
+        Ok(Fitted { material, seconds, brdf: relative_change(&table.values, &self.ideal), change })
     }
 }
 

@@ -8,6 +8,7 @@ use std::time::Instant;
 use super::curve::{About, Beside, Curve, Sweep, curves};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
+use super::simulate::laws::{self, Shown};
 use super::sweep::{Effort, Runs, Trial, run};
 use crate::brdf::{Material, ModelSpec};
 use crate::chain::{ChainError, Stage};
@@ -57,7 +58,8 @@ const MEASURES: [Measure; 3] = [
     Measure { name: "brdf", what: "root mean square of relative changes of the reduced BRDF against the truth" },
 ];
 
-const COUNTED: Law = Law { theory: Theory::Exactly(-0.5), why: "noise of independent readings averages out" };
+const MISFITTED: Law =
+    Law { theory: Theory::AtLeast(-0.5), why: "noise averages out, what the model can't follow of the material stays" };
 const SOBOL: Law =
     Law { theory: Theory::AtMost(-0.5), why: "scrambled Sobol' points are at least as good as independent ones" };
 
@@ -68,8 +70,17 @@ const SOBOL: Law =
 pub fn sweep(what: &ChainSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<(Sweep, Vec<Share>), ChainError> {
     let began = Instant::now();
     let mut links = Links::new(what, effort.seed, control)?;
-    let (series, settings) = design(what, &links);
-    let runs = run(&settings, effort, control, |index, turn| links.trial(settings[index].what, turn.seed))?;
+    let (mut series, settings) = design(what, &links);
+    let mut shown = vec![Shown::NOTHING; series.len()];
+    let runs = run(&settings, effort, control, |index, turn| {
+        let (trial, own) = links.trial(settings[index].what, turn.seed)?;
+        let of_series = &mut shown[settings[index].series];
+        *of_series = of_series.and(own);
+        Ok::<_, ChainError>(trial)
+    })?;
+    for (series, shown) in series.iter_mut().zip(shown).filter(|(series, _)| series.knob == Knob::Readings) {
+        series.laws = of_readings(what, shown).map(Some).to_vec();
+    }
     let mut found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     let mut shares = shares::all(what, &settings, &runs);
     let (mut ended, notes) = (runs.ended, shares::notes(&shares));
@@ -113,7 +124,8 @@ fn tried(
         })
         .collect();
     let effort = Effort { seed: effort.seed ^ 0x5eed, ..*effort };
-    let runs: Runs = run(&settings, &effort, control, |index, turn| links.trial(settings[index].what, turn.seed))?;
+    let runs: Runs =
+        run(&settings, &effort, control, |index, turn| links.trial(settings[index].what, turn.seed).map(|(t, _)| t))?;
     let found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     for point in found.iter().flat_map(|c| &c.points) {
         let own = shares.iter_mut().filter(|s| s.typed() == point.setting);
@@ -131,13 +143,12 @@ fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting
         } else {
             format!("readings, fitted with --stride {stride}")
         };
-        let law = Some(COUNTED).filter(|_| what.instrument.is_plain());
         series.push(Series {
             name,
             knob: Knob::Readings,
             cost: Cost::Instrument,
             main: 0,
-            laws: vec![law; 3],
+            laws: vec![None; 3], // what theory says depends on what trials show
             whole: 0.0,
             advisable: false,
         });
@@ -162,6 +173,15 @@ fn design(what: &ChainSweep<'_>, links: &Links<'_>) -> (Vec<Series>, Vec<Setting
         settings.push(Setting::sized(series.len() - 1, f64::from(n), text, Try::Pixels(n)));
     }
     (series, settings)
+}
+
+/// What theory says of errors of picture, parameters and reduced BRDF against the readings averaged.
+fn of_readings(what: &ChainSweep<'_>, shown: Shown) -> [Law; 3] {
+    let [_, brdf, parameters] = laws::of_readings(what.instrument, shown);
+    // The picture follows the parameters.
+    let is_own = what.model.to_string() == what.material.model();
+    let fitted = if is_own { parameters } else { MISFITTED };
+    [fitted, fitted, brdf]
 }
 
 /// Mean square of the main errors, and the median time, of a setting; `None` where it has no trial, or an error could not be told.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::curve::{About, Beside, Sweep, curves, words};
-use super::design::{Cost, Law, Measure, Series, Setting, Theory};
+use super::design::{Cost, Measure, Series, Setting};
 use super::knob::Knob;
 use super::sweep::{Effort, Trial, run};
 use crate::brdf::{Material, ModelSpec};
@@ -14,6 +14,7 @@ use crate::control::Control;
 use crate::fit::{FitOptions, Loss, fit};
 use crate::measurement::Measurement;
 
+mod laws;
 mod yardstick;
 
 use yardstick::Yardstick;
@@ -43,15 +44,6 @@ const MEASURES: [Measure; 3] = [
     },
     Measure { name: "image", what: "relative error of a ball's picture against that of the best fit to all samples" },
 ];
-
-const SQUARED: Law = Law {
-    theory: Theory::Exactly(-1.0),
-    why: "the cost is a square about its minimum, and parameters scatter as the root of the number of samples; of a part of n out of N samples by 1/n − 1/N",
-};
-const SCATTER: Law = Law {
-    theory: Theory::Exactly(-0.5),
-    why: "independent samples; of a part of n out of N by the root of 1/n − 1/N",
-};
 
 /// Of steps below this there are too few parts alike to tell a slope by: a table has no more of them than the step, however often one tries.
 const FEW: usize = 10;
@@ -117,13 +109,8 @@ fn design(
     let losses = if what.losses.is_empty() { vec![own_loss] } else { what.losses.clone() };
     for (m, model) in models.iter().enumerate() {
         for &loss in &losses {
-            // A loss or model that is not the yardstick's best ends at an excess of its own.
-            let is_best = loss == own_loss && yardstick.is_best(m);
-            let laws = vec![
-                Some(SQUARED).filter(|_| is_best),
-                Some(SCATTER).filter(|_| loss == own_loss),
-                Some(SCATTER).filter(|_| is_best),
-            ];
+            let (is_own, is_best) = (loss == own_loss, yardstick.is_best(m));
+            let laws = |knob: Knob| yardstick.residuals(m).laws(knob, is_own, is_best);
             let options = FitOptions { model: model.clone(), loss, ..what.options.clone() };
             let name = named(model, loss, losses.len() > 1);
             for (knob, steps) in [(Knob::Part, &what.parts), (Knob::Stride, &what.strides)] {
@@ -136,7 +123,7 @@ fn design(
                     knob,
                     cost: Cost::Computer,
                     main: 0,
-                    laws: laws.clone(),
+                    laws: laws(knob),
                     whole,
                     advisable: true,
                 });
@@ -171,7 +158,7 @@ fn design(
                 };
                 let text = typed(model, loss, what, &Knob::ExcessTarget.typed(target, 0.0));
                 let setting = Setting::sized(series.len() - 1, target, text, way);
-                settings.push(Setting { promise: Some(target).filter(|_| is_best), ..setting });
+                settings.push(Setting { promise: Some(target).filter(|_| is_own && is_best), ..setting });
             }
         }
     }

@@ -7,6 +7,7 @@ use crate::fit::{Field, FitOptions, Limit, ParameterName, fit, rmse_of};
 use crate::measurement::{Dimension, Measurement};
 use crate::render::{self, Film, Options};
 
+use super::laws::Residuals;
 use super::parameter_error;
 
 /// A ball under a point light: its pictures have no noise but that of the pixels' edges, which all share.
@@ -70,6 +71,11 @@ impl<'a> Yardstick<'a> {
     /// Whether a model's fit to all samples is the best one.
     pub fn is_best(&self, model: usize) -> bool {
         self.whole[model].rmse <= self.best
+    }
+
+    /// What is known of the residuals of a model's fit to all samples.
+    pub fn residuals(&self, model: usize) -> Residuals {
+        Residuals::of(self.whole[model].material.fit.as_ref())
     }
 
     /// The errors of a fit of a model.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::SimulateSweep;
+use super::laws::Shown;
 use crate::brdf::{Material, Sight};
 use crate::chain::{ChainError, Source, measure, reduced_until, with_job};
 use crate::control::Control;
@@ -54,6 +55,12 @@ pub fn relative_change(values: &[f64], reference: &[f64]) -> f64 {
         count += 1.0;
     }
     f64::sqrt(sum / count)
+}
+
+/// The largest relative change |x − r|/|r| over pairs of which both are numbers and r is not 0.
+pub(in crate::tradeoff) fn largest_change(values: &[f64], reference: &[f64]) -> f64 {
+    let changes = values.iter().zip(reference).map(|(x, r)| ((x - r) / r).abs());
+    changes.filter(|change| change.is_finite()).fold(0.0, f64::max)
 }
 
 /// Where trials are made.
@@ -120,14 +127,16 @@ impl<'a> Bench<'a> {
         (self.quadrature_error > least).then_some(said).into_iter().collect()
     }
 
-    pub fn trial(&mut self, read: &Read, turn: Turn) -> Result<Trial, ChainError> {
+    /// A trial, and what it shows of noise.
+    pub fn trial(&mut self, read: &Read, turn: Turn) -> Result<(Trial, Shown), ChainError> {
+        let quiet = |trial: Trial| (trial, Shown::NOTHING);
         match read {
-            Read::Quadrature(accuracy) => self.means((*accuracy, None), (FINEST, None), turn.round),
+            Read::Quadrature(accuracy) => self.means((*accuracy, None), (FINEST, None), turn.round).map(quiet),
             Read::Order(order) => {
                 let better = (ACCURACY, Some(self.highest_order()));
-                self.means((ACCURACY, Some(*order)), better, turn.round)
+                self.means((ACCURACY, Some(*order)), better, turn.round).map(quiet)
             }
-            Read::Without(name) => self.without(*name, turn.round),
+            Read::Without(name) => self.without(*name, turn.round).map(quiet),
             Read::Noisy { instrument, scan } => self.noisy(instrument, scan, turn.seed),
         }
     }
@@ -202,7 +211,7 @@ impl<'a> Bench<'a> {
         fitted_as(self.what.source, table, instrument)
     }
 
-    fn noisy(&mut self, instrument: &Instrument, scan: &Scan, seed: u64) -> Result<Trial, ChainError> {
+    fn noisy(&mut self, instrument: &Instrument, scan: &Scan, seed: u64) -> Result<(Trial, Shown), ChainError> {
         let SimulateSweep { source, name, .. } = self.what;
         let quiet = self.control.quiet();
         let clock = Instant::now();
@@ -214,20 +223,24 @@ impl<'a> Bench<'a> {
             self.truths.insert(key.clone(), ideal.values);
         }
         let truth = self.truths.get(&key).map_or(&[][..], |values| &values[..]);
-        let noise = if instrument.is_plain() {
-            relative_change(&table.values, truth)
+        let (noise, change, saturates) = if instrument.is_plain() {
+            (relative_change(&table.values, truth), largest_change(&table.values, truth), false)
         } else {
             // The same instrument, with the same errors of its own, with noise and without.
             let [noisy, calm] = [&[][..], &NOISE].map(|left_out| {
                 with_job(name, source, instrument, scan, seed, quiet, |job| Job { left_out, ..*job }.run(quiet))
             });
-            noise_of(&noisy?, &calm?, instrument)
+            let Sums { noisy, calm, saturates } = sums_of(&noisy?, &calm?, instrument);
+            (relative_change(&noisy, &calm), largest_change(&noisy, &calm), saturates)
         };
         let parameters = match (source, self.fitted(&table, instrument)) {
             (Source::Fitted(truth), Some(fitted)) => parameter_error(&fitted, truth),
             _ => f64::NAN,
         };
-        Ok(Trial { seconds, errors: vec![noise, relative_change(&table.values, truth), parameters] })
+        // An error that could not be told is as large as one may be.
+        let off = if parameters.is_nan() && matches!(source, Source::Fitted(_)) { f64::INFINITY } else { parameters };
+        let shown = Shown { change, parameters: f64::max(0.0, off), saturates };
+        Ok((Trial { seconds, errors: vec![noise, relative_change(&table.values, truth), parameters] }, shown))
     }
 }
 
@@ -240,14 +253,23 @@ fn fitted_as(source: &Source, table: &Measurement, instrument: &Instrument) -> O
     fit(table, &options).ok().map(|fitted| fitted.material)
 }
 
-/// Noise of readings averaged at each pair of directions, of the longest exposure that does not saturate.
-fn noise_of(noisy: &Raw, calm: &Raw, instrument: &Instrument) -> f64 {
+/// Readings added up at each pair of directions, of the longest exposure that does not saturate, with noise and without.
+struct Sums {
+    noisy: Vec<f64>,
+    calm: Vec<f64>,
+    /// Whether some exposure saturates.
+    saturates: bool,
+}
+
+fn sums_of(noisy: &Raw, calm: &Raw, instrument: &Instrument) -> Sums {
     let full =
         if instrument.detector.full_well > 0.0 { UNSATURATED * instrument.detector.full_well } else { f64::INFINITY };
     // By pair and channel: the exposure, and both sums.
     let mut longest: BTreeMap<(u32, usize), (f64, f64, f64)> = BTreeMap::new();
+    let mut saturates = false;
     for (i, reading) in calm.readings.iter().enumerate() {
         let Some(entry) = reading.entry.filter(|_| reading.kind == Kind::Sample) else { continue };
+        saturates |= calm.signals(i).iter().any(|r| *r >= full);
         for (c, (x, r)) in noisy.signals(i).iter().zip(calm.signals(i)).enumerate().filter(|(_, (_, r))| **r < full) {
             let sums = longest.entry((entry, c)).or_insert((0.0, 0.0, 0.0));
             if reading.exposure_s > sums.0 {
@@ -258,8 +280,8 @@ fn noise_of(noisy: &Raw, calm: &Raw, instrument: &Instrument) -> f64 {
             }
         }
     }
-    let (noisy, calm): (Vec<f64>, Vec<f64>) = longest.values().map(|sums| (sums.1, sums.2)).unzip();
-    relative_change(&noisy, &calm)
+    let (noisy, calm) = longest.values().map(|sums| (sums.1, sums.2)).unzip();
+    Sums { noisy, calm, saturates }
 }
 
 /// Relative change of the readings of the sample.
@@ -304,7 +326,7 @@ mod tests {
         let mut tried = |round: u32| {
             let turn = Turn { round, seed: 0, again: false };
             let reads = [Read::Quadrature(1e-3), Read::Without(None), Read::Without(Some("shot noise"))];
-            let errors = reads.map(|read| bench.trial(&read, turn).expect("reads").errors[0]);
+            let errors = reads.map(|read| bench.trial(&read, turn).expect("reads").0.errors[0]);
             let rounds: Vec<u32> = bench.whole.values().map(|(of, _)| *of).collect();
             let kept = (bench.better[FINE].as_ref().map(|(of, _)| *of), rounds);
             assert_eq!(kept, (Some(round), vec![round; 2]), "one of all effects, one with the noise that is looked at");

@@ -13,9 +13,12 @@ use crate::gonio::{self, Instrument, Scan, lit_rows};
 use crate::measurement::Directions;
 
 mod bench;
+pub(in crate::tradeoff) mod laws;
 
+pub(in crate::tradeoff) use bench::largest_change;
 pub use bench::relative_change;
 use bench::{Bench, Read};
+use laws::Shown;
 
 /// What is swept.
 #[derive(Debug)]
@@ -57,13 +60,10 @@ const MEASURES: [Measure; 3] = [
     },
 ];
 
-const COUNTED: Law = Law { theory: Theory::Exactly(-0.5), why: "noise of independent readings averages out" };
-const EXPOSED: Law = Law { theory: Theory::Exactly(-0.5), why: "shot noise; read noise alone would fall as 1/t" };
 const KINKED: Law = Law {
     theory: Theory::AtMost(-2.0),
     why: "a table has kinks at its values: each cell that one crosses is off by the cell's square",
 };
-const SAMPLED: Law = Law { theory: Theory::Exactly(-0.5), why: "as many independent readings" };
 
 /// Sweeps the knobs of a simulated measurement.
 ///
@@ -72,8 +72,18 @@ const SAMPLED: Law = Law { theory: Theory::Exactly(-0.5), why: "as many independ
 pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<Sweep, ChainError> {
     let began = Instant::now();
     let mut bench = Bench::new(what, effort.seed, control);
-    let (series, settings) = design(what);
-    let runs = run(&settings, effort, control, |index, turn| bench.trial(&settings[index].what, turn))?;
+    let (mut series, settings) = design(what);
+    let mut shown = vec![Shown::NOTHING; series.len()];
+    let runs = run(&settings, effort, control, |index, turn| {
+        let (trial, own) = bench.trial(&settings[index].what, turn)?;
+        let of_series = &mut shown[settings[index].series];
+        *of_series = of_series.and(own);
+        Ok::<_, ChainError>(trial)
+    })?;
+    for (series, shown) in series.iter_mut().zip(shown) {
+        let laws = laws::of(series.knob, (what.instrument, what.source), &what.steps, shown);
+        series.laws = laws.unwrap_or_else(|| std::mem::take(&mut series.laws));
+    }
     let found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     let about = About {
         stage: "simulate",
@@ -129,20 +139,19 @@ impl Designed<'_> {
     fn of_readings(&mut self) {
         let SimulateSweep { instrument, scan, readings, dwell, steps, source, .. } = self.what;
         let main = if matches!(source, Source::Fitted(_)) { 2 } else { 1 };
-        // What readings share does not average out.
-        let is_plain = instrument.is_plain();
-        let laws = |law| vec![Some(law), Some(law).filter(|_| is_plain), Some(law).filter(|_| is_plain)];
+        // What theory says depends on what trials show.
+        let laws = || vec![None; 3];
         let noisy =
             |instrument: Instrument, scan: &Scan| Read::Noisy { instrument: Box::new(instrument), scan: scan.clone() };
         if !readings.is_empty() {
-            self.begin("readings averaged", Knob::Readings, Cost::Instrument, main, laws(COUNTED));
+            self.begin("readings averaged", Knob::Readings, Cost::Instrument, main, laws());
         }
         for &n in readings {
             let more = Instrument { readings: n, ..(*instrument).clone() };
             self.push(f64::from(n), Knob::Readings.typed(f64::from(n), 0.0), noisy(more, scan));
         }
         if !dwell.is_empty() {
-            self.begin("exposure", Knob::Dwell, Cost::Instrument, main, laws(EXPOSED));
+            self.begin("exposure", Knob::Dwell, Cost::Instrument, main, laws());
         }
         for &factor in dwell {
             let mut longer = (*instrument).clone();
@@ -150,8 +159,7 @@ impl Designed<'_> {
             self.push(factor, Knob::Dwell.typed(factor, 0.0), noisy(longer, scan));
         }
         if !steps.is_empty() {
-            let laws = vec![None, None, Some(SAMPLED).filter(|_| is_plain)];
-            self.begin("step of the scan", Knob::Step, Cost::Instrument, main, laws);
+            self.begin("step of the scan", Knob::Step, Cost::Instrument, main, laws());
         }
         for &step in steps {
             let Some((finer, pairs)) = stepped(scan, step) else { continue };
