@@ -37,7 +37,8 @@ pub(super) struct Args {
     /// Relative error that means over the cones of source and aperture may have [default: 1e-6]
     #[arg(long, value_name = "E", value_parser = parse_tolerance, conflicts_with = "time_budget")]
     target_error: Option<f64>,
-    /// Time from the program's start to the last reading (50ms, 2s, 1m): means over cones are as good as fits into it
+    /// Time from the program's start to the last reading (50ms, 2s, 1m): means over cones and spot are as good as fits into it. Reducing the readings and
+    /// writing files come after it; without means nothing depends on it
     #[arg(long, value_name = "T", value_parser = parse_time)]
     time_budget: Option<Duration>,
     /// Where to write; the extension chooses the format (.csv, .binary); `-` is CSV on stdout
@@ -68,7 +69,8 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     }
     let (mut table, raw, how) = if args.raw.is_none() && args.auto.is_none() && plan.instrument.is_plain() {
         let table = chain::measure(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control())?;
-        (table, None, How { seconds: ui.start().elapsed().as_secs_f64(), ..How::default() })
+        let (budget_s, seconds) = (args.budget_s(), ui.start().elapsed().as_secs_f64());
+        (table, None, How { budget_s, seconds, ..How::default() })
     } else {
         let (raw, how) =
             chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
@@ -105,6 +107,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ));
     }
     write_measurement(&table, &args.out, format, ui)?;
+    let how = How { in_all_s: ui.start().elapsed().as_secs_f64(), ..how };
     let result = report(args, &plan, &table, raw.as_ref(), &how);
     let outputs = [Some(args.out.as_path()), args.raw.as_deref()];
     finish(&table, raw.as_ref(), &plan.instrument, result, &outputs, ui)
@@ -118,6 +121,9 @@ fn below_horizon(scan: &Scan, table: &Measurement) -> Option<String> {
     (below > 0 && matches!(scan, Scan::List { .. }))
         .then(|| format!("{pairs} of directions {are} masked: at or below the horizon"))
 }
+
+/// Why neither accuracy nor time for it change anything.
+const NO_MEANS: &str = "all was read, for this instrument reads without means over cones or spot";
 
 /// How readings were made.
 #[derive(Default)]
@@ -133,6 +139,10 @@ struct How {
     budget_s: Option<f64>,
     /// From the program's start to the last reading, s.
     seconds: f64,
+    /// To the last file, s.
+    in_all_s: f64,
+    /// Effects whose means the accuracy is of.
+    means: Vec<&'static str>,
 }
 
 /// Where readings end later than the budget by more than this share of it and more than these seconds, it is said.
@@ -148,17 +158,74 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     });
     let left_out: Vec<&str> = spared.iter().map(|s| s.effect).collect();
     let job = Job { left_out: &left_out, ..job };
+    let means = gonio::means(job.instrument, job.channels);
+    let means: Vec<&str> = means.into_iter().filter(|name| !left_out.contains(name)).collect();
     let left = args.time_budget.map(|time| time.saturating_sub(ui.start().elapsed()));
-    let affordable = left.map(|left| job.affordable(left, ui.control().stop));
+    // Without means there is nothing to choose.
+    let affordable = left.filter(|_| !means.is_empty()).map(|left| job.affordable(left, ui.control().stop));
     let accuracy = affordable.map_or(job.accuracy, |a| a.accuracy);
     let raw = Job { accuracy, ..job }.run_until(affordable.map(|a| a.deadline), ui.control());
     let error = raw.quadrature_error;
     let (left_s, seconds) = (left.unwrap_or_default().as_secs_f64(), ui.start().elapsed().as_secs_f64());
-    let budget_s = args.time_budget.map(|time| time.as_secs_f64());
-    (raw, How { spared, affordable, error, accuracy, left_s, budget_s, seconds })
+    (
+        raw,
+        How {
+            spared,
+            affordable,
+            error,
+            accuracy,
+            left_s,
+            budget_s: args.budget_s(),
+            seconds,
+            in_all_s: seconds,
+            means,
+        },
+    )
+}
+
+impl Args {
+    /// The time budget, s.
+    fn budget_s(&self) -> Option<f64> {
+        self.time_budget.map(|time| time.as_secs_f64())
+    }
 }
 
 impl How {
+    /// What came of the accuracy that was asked for, or of the time for it; nothing where there is nothing to say.
+    fn said(&self, args: &Args) -> String {
+        let mut text = match (args.time_budget, args.target_error) {
+            (None, None) if self.error == 0.0 => return String::new(),
+            (Some(_), _) if self.means.is_empty() => format!("; --time-budget changed nothing: {NO_MEANS}"),
+            (_, Some(_)) if self.means.is_empty() => format!("; --target-error changed nothing: {NO_MEANS}"),
+            _ => format!("; means over cones to {:.1e}", self.error),
+        };
+        if let Some(budget_s) = self.budget_s {
+            let after = self.in_all_s - self.seconds;
+            let _ = write!(
+                text,
+                "; the last reading ended after {:.2} s of {budget_s} s, reducing and writing took {after:.2} s more",
+                self.seconds
+            );
+        }
+        text
+    }
+
+    /// What came of a time budget, for scripts; null without one.
+    fn budget_json(&self) -> serde_json::Value {
+        let Some(budget_s) = self.budget_s else { return serde_json::Value::Null };
+        let mut object = json!({ "seconds": budget_s, "governs": self.means, "fits": !self.is_late(budget_s) });
+        if let Some(Affordable { accuracy, predicted_s, fits, .. }) = self.affordable {
+            object["accuracy"] = json!(accuracy);
+            object["predicted_s"] = json!(predicted_s);
+            object["fits"] = json!(fits);
+        }
+        object
+    }
+
+    fn is_late(&self, budget_s: f64) -> bool {
+        self.seconds > budget_s + (LATE.0 * budget_s).max(LATE.1)
+    }
+
     /// Says where what was asked for could not be reached.
     fn warn(&self, ui: &Ui) {
         if self.error > self.accuracy {
@@ -170,13 +237,12 @@ impl How {
             ));
         }
         let Some(budget_s) = self.budget_s else { return };
-        let late = self.seconds > budget_s + (LATE.0 * budget_s).max(LATE.1);
         if self.affordable.is_some_and(|a| !a.fits) {
             ui.warn(&format!(
                 "even the lowest orders, with which all was read, take longer than --time-budget: the readings ended at {:.2} s, {:.2} s were left when trials began",
                 self.seconds, self.left_s
             ));
-        } else if late {
+        } else if self.is_late(budget_s) {
             ui.warn(&format!(
                 "the readings ended at {:.2} s, later than the {budget_s} s of --time-budget",
                 self.seconds
@@ -217,13 +283,11 @@ fn report(args: &Args, plan: &Plan, table: &Measurement, raw: Option<&Raw>, how:
         let names: Vec<String> = how.spared.iter().map(|s| format!("{} ({:.1e})", s.effect, s.bound)).collect();
         let _ = write!(text, "; left out: {}", if names.is_empty() { "none".into() } else { names.join(", ") });
     }
-    if how.error > 0.0 || args.target_error.is_some() || args.time_budget.is_some() {
-        let _ = write!(text, "; means over cones to {:.1e}", how.error);
-    }
+    text.push_str(&how.said(args));
     let object = json!({
         "out": args.out, "entries": table.len(), "valid": valid, "scan": plan.scan.to_string(), "seed": plan.seed, "instrument_hours": hours,
-        "effects": effects, "left_out": how.spared, "quadrature_error": how.error, "time_budget": how.affordable,
-        "seconds_to_last_reading": how.seconds,
+        "effects": effects, "left_out": how.spared, "quadrature_error": how.error, "time_budget": how.budget_json(),
+        "seconds_to_last_reading": how.seconds, "seconds_to_last_file": how.in_all_s,
         "notes": table.notes,
     });
     (text, object)

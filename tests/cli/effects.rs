@@ -126,6 +126,7 @@ fn targets_and_times_say_what_was_reached() {
     assert!(usual <= 1e-6 && coarse <= 1e-2 && fine <= 1e-9 && coarse > fine, "{usual} {coarse} {fine}");
     let (_, timed) = reached(&["--time-budget", "1h"]);
     assert_eq!(timed["time_budget"]["fits"], true);
+    assert_eq!(timed["time_budget"]["governs"], serde_json::json!(["detector aperture"]));
     let short = b.ok(&["simulate", "lab.toml", "--out", "m.csv", "--time-budget", "1ns"]);
     assert!(short.err.contains("even the lowest orders"), "{}", short.err);
     for wrong in [&["--target-error", "0"][..], &["--time-budget", "0s"], &["--auto", "-1"]] {
@@ -135,4 +136,35 @@ fn targets_and_times_say_what_was_reached() {
         b.run(&["simulate", "lab.toml", "--out", "m.csv", "--target-error", "1%", "--time-budget", "1s"]).code,
         Some(2)
     );
+}
+
+/// What a time budget is of, and what it is not: readings without means don't depend on it, reduction and files come after it.
+#[test]
+fn a_time_budget_says_what_it_covers_and_where_nothing_depends_on_it() {
+    let b = bench();
+    let text = b.ok(&["simulate", "lab.toml", "--out", "m.csv", "--time-budget", "1h"]).text();
+    assert!(text.contains("of 3600 s, reducing and writing took") && text.contains("means over cones to"), "{text}");
+    // Points, with and without raw readings.
+    let points = ["simulate", "--material", "satin", "--scan", "in-plane:10", "--seed", "3"];
+    for more in [&[][..], &["--raw", "raw.csv"]] {
+        b.ok(&[&points[..], &["--out", "free.csv"], more].concat());
+        let timed = [&points[..], &["--out", "m.csv", "--time-budget", "1h"], more].concat();
+        let text = b.ok(&timed).text();
+        for says in [
+            "--time-budget changed nothing",
+            "without means over cones or spot",
+            "of 3600 s, reducing and writing took",
+        ] {
+            assert!(text.contains(says), "{says}: {text}");
+        }
+        assert_eq!(b.bytes("m.csv"), b.bytes("free.csv"), "{more:?}");
+        let said = b.json(&timed);
+        let (budget, reading) = (&said["time_budget"], number(&said["seconds_to_last_reading"]));
+        assert_eq!((&budget["fits"], &budget["governs"]), (&Value::Bool(true), &Value::Array(vec![])), "{budget}");
+        assert!(number(&said["seconds_to_last_file"]) >= reading && reading > 0.0, "{said}");
+    }
+    let text = b.ok(&[&points[..], &["--out", "m.csv", "--target-error", "1%"]].concat()).text();
+    assert!(text.contains("--target-error changed nothing"), "{text}");
+    let said = b.json(&[&points[..], &["--out", "m.csv"]].concat());
+    assert!(said["time_budget"].is_null(), "{said}");
 }

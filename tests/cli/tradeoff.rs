@@ -205,7 +205,10 @@ fn theory_is_stated_where_it_holds() {
     let (slope, law, _) = exposed("--read-noise 0");
     assert!((slope + 0.5).abs() < 0.05 && law == ("exactly".into(), vec![-0.5]), "{slope} {law:?}");
     let (slope, law, _) = exposed("--electrons 300");
-    assert!(slope > -1.03 && law == ("at-least".into(), vec![-1.0]), "readings darker than their noise: {slope} {law:?}");
+    assert!(
+        slope > -1.03 && law == ("at-least".into(), vec![-1.0]),
+        "readings darker than their noise: {slope} {law:?}"
+    );
     // What readings share bounds their average.
     let args = "tradeoff simulate --material satin --instrument commercial --scan in-plane:15 --knobs readings --average 1,2,4 --trials 3";
     let found = b.json(&typed(args));

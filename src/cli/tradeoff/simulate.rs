@@ -1,13 +1,12 @@
 //! `goniofit tradeoff simulate`.
 
 use super::{Common, parse_positive};
-use crate::chain::Source;
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::simulation::{Plan, What};
 use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
-use crate::gonio::{self, Instrument, MOST_ORDER, Scan};
+use crate::gonio::{self, MOST_ORDER, Scan};
 use crate::tradeoff::simulate::{SimulateSweep, sweep};
 
 #[derive(Debug, clap::Args)]
@@ -58,7 +57,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let on = |knob: &str| args.knobs.contains(&knob);
     let mut steps = list(on("step"), &args.steps);
     steps.sort_by(|a, b| b.total_cmp(a));
-    let has_means = means(&plan.instrument, &source);
+    let has_means = !gonio::means(&plan.instrument, source.channels()).is_empty();
     let mut quadrature = list(on("quadrature") && has_means, &args.target_errors);
     quadrature.sort_by(|a, b| b.total_cmp(a));
     let what = SimulateSweep {
@@ -76,12 +75,6 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let mut found = sweep(&what, &args.common.effort(plan.seed, ui), ui.control())?;
     found.commands = vec![base(&args.what, &plan)];
     args.common.finish(&found, None, ui)
-}
-
-/// Whether readings are means over a cone or the spot.
-fn means(instrument: &Instrument, source: &Source) -> bool {
-    let of = ["spot extent", "source divergence", "detector aperture"];
-    gonio::plan(instrument, source.channels()).effects.iter().any(|effect| effect.on && of.contains(&effect.name))
 }
 
 /// The command that settings go with.

@@ -145,6 +145,12 @@ pub fn plan(instrument: &Instrument, channels: &[String]) -> Plan {
     plan
 }
 
+/// The effects that make readings means over directions, of those that the instrument calls for: the only ones that an accuracy, or the time for it, is asked for.
+#[must_use]
+pub fn means(instrument: &Instrument, channels: &[String]) -> Vec<&'static str> {
+    plan(instrument, channels).effects.iter().filter(|e| e.on && is_mean(e.name)).map(|e| e.name).collect()
+}
+
 /// Effects by chance, anew in every reading: what they do is a standard deviation.
 pub(super) const NOISE: [&str; 3] = [shot::EFFECT.name, read_noise::EFFECT.name, quantisation::EFFECT.name];
 /// The two passes that every reading takes.
