@@ -51,8 +51,10 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             "means over cones are good to {error:.1e} at worst, not to {ACCURACY:e}: their orders end there"
         ));
     }
+    let spec = || args.what.spec.as_ref().map(|spec| spec.display().to_string());
+    let instrument = args.what.instrument.clone().or_else(spec);
     let object = json!({
-        "material": plan.material, "scan": plan.scan.to_string(), "seed": plan.seed, "readings": found.readings,
+        "instrument": instrument, "material": plan.material, "scan": plan.scan.to_string(), "seed": plan.seed, "readings": found.readings,
         "seconds": found.seconds, "quadrature_error": found.quadrature_error, "effects": found.effects,
     });
     ui.result(&table(&plan, &found), &object);

@@ -1,5 +1,7 @@
 //! The plan of effects: what was simulated, and because of what.
 
+use std::path::Path;
+
 use serde_json::Value;
 
 use crate::chain::{NOISY_DETECTOR, Stage, scene_plan};
@@ -32,17 +34,20 @@ pub(super) struct Listed {
 
 pub(super) struct Effects {
     pub lists: Vec<Listed>,
-    /// Why there is no list of the instrument's, where there should be one.
+    /// Why there is no list of an instrument's, where there should be one.
     pub missing: Option<String>,
 }
 
 pub(super) fn effects(run: &Run) -> Effects {
-    let (instrument, missing) = match instrument(run) {
-        None => (None, None),
-        Some(Ok(list)) => (Some(list), None),
-        Some(Err(reason)) => (None, Some(reason)),
-    };
-    Effects { lists: instrument.into_iter().chain(scene(run)).collect(), missing }
+    let (mut lists, mut missing) = (Vec::new(), Vec::new());
+    for found in instruments(run) {
+        match found {
+            Ok(list) => lists.push(list),
+            Err(reason) => missing.push(reason),
+        }
+    }
+    lists.extend(scene(run));
+    Effects { lists, missing: (!missing.is_empty()).then(|| missing.join(" ")) }
 }
 
 fn plain(plan: Plan) -> Vec<Effect> {
@@ -56,11 +61,25 @@ fn plain(plan: Plan) -> Vec<Effect> {
     plan.effects.into_iter().map(one).collect()
 }
 
-/// Of a simulated measurement; the reason where its instrument is not at hand.
-fn instrument(run: &Run) -> Option<Result<Listed, String>> {
-    if run.kind != Kind::Demo {
-        return None;
+/// Of the instrument that simulated readings, or of those that fits were made through; the reason where one is not at hand.
+fn instruments(run: &Run) -> Vec<Result<Listed, String>> {
+    if run.kind == Kind::Demo {
+        return simulated(run).into_iter().collect();
     }
+    let mut found: Vec<(&str, Result<Listed, String>)> = Vec::new();
+    for fit in &run.fits {
+        let Some(record) = fit.material().fit.as_ref().filter(|record| record.through.is_some()) else { continue };
+        // What the fit says, or what it was typed as.
+        let Some(name) = fit.through.as_deref().or(record.instrument.as_deref()) else { continue };
+        if found.iter().all(|(known, _)| *known != name) {
+            found.push((name, seen_through(run, fit, name)));
+        }
+    }
+    found.into_iter().map(|(_, list)| list).collect()
+}
+
+/// Of the instrument that a demo simulated.
+fn simulated(run: &Run) -> Option<Result<Listed, String>> {
     let name = run.instrument.as_deref()?;
     let truth = run.truth.as_ref()?.material();
     let mut words = vec!["goniofit", "effects", "--material", &run.title];
@@ -68,17 +87,43 @@ fn instrument(run: &Run) -> Option<Result<Listed, String>> {
     if !own {
         words.extend(["--instrument", name]);
     }
-    let command = typed(&words);
     let known = if own { Some(Instrument::default()) } else { known_instrument(name, &run.folders()) };
-    Some(match known {
-        Some(known) => {
-            let effects = plain(gonio::plan(&known, &truth.channels));
-            Ok(Listed::new(format!("The instrument, {name}"), effects, false, command))
-        }
-        None => Err(format!(
+    Some(listed(run, known.as_ref(), (name, format!("The instrument, {name}")), &truth.channels, &words))
+}
+
+/// Of the instrument that a fit was made through, where it is what it was then.
+fn seen_through(run: &Run, fit: &RunFit, name: &str) -> Result<Listed, String> {
+    let words = ["goniofit", "effects", "--material", &fit.file, "--instrument", name];
+    let known = fit.through.as_ref().and_then(|_| known_instrument(name, &fit_folders(run, fit)));
+    let title = format!("The instrument, {name}, through which {} is a fit", fit.label);
+    listed(run, known.as_ref(), (name, title), &fit.material().channels, &words)
+}
+
+/// Where a fit's instrument may lie: as the run's files, and beside the fit.
+fn fit_folders<'a>(run: &'a Run, fit: &'a RunFit) -> Vec<&'a Path> {
+    let beside = Path::new(&fit.file).parent().unwrap_or(Path::new(""));
+    run.folders().into_iter().chain([beside]).collect()
+}
+
+fn listed(
+    run: &Run,
+    known: Option<&Instrument>,
+    (name, title): (&str, String),
+    channels: &[String],
+    words: &[&str],
+) -> Result<Listed, String> {
+    let command = typed(words);
+    let Some(known) = known else {
+        return Err(format!(
             "What the instrument {name} simulates is not known here: it is neither built in, nor can its file be read where the run was made. Where it is: {command}"
-        )),
-    })
+        ));
+    };
+    let measured = run.effects.as_ref().filter(|e| e["instrument"] == name);
+    let effects = match measured.and_then(|found| found["effects"].as_array()) {
+        Some(found) => found.iter().map(told).collect(),
+        None => plain(gonio::plan(known, channels)),
+    };
+    Ok(Listed::new(title, effects, measured.is_some(), command))
 }
 
 /// Of the scene, with what `effects.json` says of it.
@@ -114,21 +159,25 @@ impl Listed {
     }
 }
 
+/// As `effects --json` says it: a scene's picture is off by one number, an instrument's readings by the root of their mean square.
 fn told(effect: &Value) -> Effect {
-    let share = |key: &str| effect[key].as_f64().map_or("–".into(), percent);
+    let share = |value: &Value| value.as_f64().map_or("–".into(), percent);
+    let off_by = if effect["off_by"].is_null() { &effect["reading"]["rms"] } else { &effect["off_by"] };
     Effect {
         name: effect["effect"].as_str().unwrap_or_default().into(),
         on: effect["on"] == true,
         why: effect["why"].as_str().unwrap_or_default().into(),
-        share: share("share"),
-        off_by: share("off_by"),
+        share: share(&effect["share"]),
+        off_by: share(off_by),
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
-    use crate::brdf::{LobeKind, Material};
+    use crate::brdf::{FitRecord, LobeKind, Material};
 
     fn measured_by(name: &str) -> Run {
         let truth = Material::new(vec!["x".into()], vec![(LobeKind::Lambert, vec![0.5], vec![])]);
@@ -157,5 +206,62 @@ mod tests {
         let found = effects(&run);
         assert!(found.lists.is_empty(), "another instrument's effects under its name");
         assert!(found.missing.is_some_and(|said| said.contains("mine.toml")));
+    }
+
+    const WIDE: &str = "version = 1\n[instrument]\nelectrons = 1e6\n[instrument.detector]\naperture_deg = 4.0\n";
+
+    /// A fit through `wide.toml`, which lies where the run was made, or does not.
+    fn fitted_through_wide(folder: &std::path::Path, is_there: bool) -> Run {
+        let mut material = Material::new(vec!["x".into()], vec![(LobeKind::Lambert, vec![0.5], vec![])]);
+        let record = FitRecord {
+            through: Some("an aperture of 4.000°".into()),
+            instrument: Some("wide.toml".into()),
+            ..FitRecord::default()
+        };
+        material.fit = Some(record);
+        if is_there {
+            std::fs::write(folder.join("wide.toml"), WIDE).expect("writes");
+        }
+        let fit = RunFit {
+            label: "lambert".into(),
+            file: folder.join("fit.json").display().to_string(),
+            predicted: Predicted::new(&material, None),
+            through: is_there.then(|| "wide.toml".into()),
+            image: None,
+        };
+        Run { fits: vec![fit], ..Run::empty() }
+    }
+
+    #[test]
+    fn a_fit_through_an_instrument_has_that_instruments_effects() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let found = effects(&fitted_through_wide(folder.path(), false));
+        assert!(found.lists.is_empty() && found.missing.is_some_and(|said| said.contains("wide.toml")));
+        let mut run = fitted_through_wide(folder.path(), true);
+        let names = |list: &Listed| list.on.iter().map(|e| e.name.clone()).collect::<Vec<_>>();
+        let found = effects(&run);
+        let list = &found.lists[0];
+        assert_eq!((found.lists.len(), found.missing.as_ref(), list.measured), (1, None, false));
+        assert_eq!(names(list), ["detector aperture", "shot noise", "read noise"]);
+        assert!(
+            list.title.contains("wide.toml") && list.command.ends_with("--instrument wide.toml"),
+            "{}",
+            list.command
+        );
+        // With what each is worth, where that was measured of this instrument, and not of another.
+        let mut measured = |instrument: &str| {
+            let aperture = json!({"effect": "detector aperture", "on": true, "why": "4", "share": 0.5, "reading": {"largest": 0.5, "rms": 0.25}});
+            run.effects = Some(json!({"instrument": instrument, "effects": [aperture]}));
+            let list = effects(&run).lists.swap_remove(0);
+            (list.measured, list.on[0].off_by.clone(), list.on.len())
+        };
+        assert_eq!(measured("wide.toml"), (true, percent(0.25), 1));
+        assert_eq!(measured("other.toml"), (false, String::new(), 3));
+        // Of a plain fit there is nothing to list.
+        let mut plain = fitted_through_wide(folder.path(), true);
+        let material = Material { fit: None, ..plain.fits[0].material().clone() };
+        plain.fits[0].predicted = Predicted::new(&material, None);
+        let found = effects(&plain);
+        assert!(found.lists.is_empty() && found.missing.is_none());
     }
 }
