@@ -164,6 +164,94 @@ fn residual_maps_tell_the_cells_that_the_plot_command_tells() {
     }
 }
 
+/// Half and difference angles: columns are spaced by the root of θh.
+#[test]
+fn the_map_of_half_and_difference_angles_tells_the_cells_that_the_plot_command_tells() {
+    let test = "the_map_of_half_and_difference_angles_tells_the_cells_that_the_plot_command_tells";
+    let Some(mut page) = page_or_skip(test) else { return };
+    open(&mut page);
+    let plotted = |statistic: &str| {
+        let files = ["demo/measurement.csv", "demo/lambert+phong.json", "--out", "r.svg", "--statistic", statistic];
+        let map = Run::shared().json(&[&["plot", "residuals"][..], &files].concat())["maps"][0].clone();
+        assert_eq!(map["over"], serde_json::json!(["theta_h", "theta_d"]));
+        map
+    };
+    let maps = ["mean", "rms", "over-noise"].map(plotted);
+    let list = |v: &Value| v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap_or(f64::NAN)).collect::<Vec<f64>>();
+    let (x, y, count) = (list(&maps[0]["columns_deg"]), list(&maps[0]["rows_deg"]), list(&maps[0]["count"]));
+    let filled: Vec<usize> = (0..count.len()).filter(|k| count[*k] > 0.0).collect();
+    let svg = "document.querySelector('[data-fit=\"1\"] [data-over=half][data-statistic=mean] svg')";
+    click(&mut page, "statistic", "mean");
+    page.eval(&format!("{svg}.scrollIntoView({{ block: 'center', behavior: 'instant' }})"));
+    for k in [filled[0], filled[filled.len() / 3], filled[filled.len() / 2], filled[filled.len() - 1]] {
+        let (i, j) = (k % (x.len() - 1), k / (x.len() - 1));
+        let (theta_h, theta_d) = (0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1]));
+        let at = page.eval(&format!(
+            "(() => {{
+              const svg = {svg};
+              const [left, top, width, height] = svg.dataset.area.split(' ').map(Number);
+              const point = new DOMPoint(left + Math.sqrt({theta_h} / 90) * width, top + height - {theta_d} / 90 * height);
+              const p = point.matrixTransform(svg.getScreenCTM());
+              return [p.x, p.y];
+            }})()"
+        ));
+        page.point_at(at[0].as_f64().unwrap(), at[1].as_f64().unwrap());
+        let said = text(&mut page, "#residual-readout");
+        assert!(said.starts_with("lambert+phong, θh "), "{said}");
+        let found = numbers_in(&said);
+        let values = maps.each_ref().map(|map| map["value"][k].as_f64().expect("a filled cell"));
+        let want = [&[x[i], x[i + 1], y[j], y[j + 1]][..], &values, &[count[k]]].concat();
+        assert_eq!(found.len(), want.len(), "{said}");
+        // Borders and means over their error have three digits, the others four.
+        for (found, want) in found.iter().zip(&want) {
+            close(*found, *want, 6e-3, &said);
+        }
+        close(found[4], values[0], 1e-3, &said);
+        close(found[5], values[1], 1e-3, &said);
+    }
+}
+
+/// From the system's scheme to dark, to light, and back; each colours the page and its figures, and the button says which it is.
+#[test]
+fn the_theme_button_goes_round_and_outweighs_the_systems_scheme() {
+    let Some(mut page) = page_or_skip("the_theme_button_goes_round_and_outweighs_the_systems_scheme") else { return };
+    open(&mut page);
+    let shown = |page: &mut Page| {
+        page.eval(
+            "(() => {
+              const style = (e) => getComputedStyle(e);
+              const figure = document.querySelector('#lobe-frames [data-channel]:not([hidden]) svg text');
+              return {
+                said: document.querySelector('#theme').textContent, chosen: document.documentElement.dataset.theme ?? 'auto',
+                scheme: style(document.documentElement).colorScheme, paper: style(document.body).backgroundColor,
+                ink: style(document.body).color, figure: style(figure).fill,
+              };
+            })()",
+        )
+    };
+    let colors = |shown: &Value| ["scheme", "paper", "ink", "figure"].map(|key| shown[key].clone());
+    let light = colors(&shown(&mut page));
+    page.window(1400, 1000, "dark");
+    let dark = colors(&shown(&mut page));
+    assert!(light.iter().zip(&dark).all(|(a, b)| a != b), "{light:?} {dark:?}");
+    for (system, clicks) in [("light", ["dark", "light", "auto"]), ("dark", ["dark", "light", "auto"])] {
+        page.window(1400, 1000, system);
+        let own = if system == "dark" { &dark } else { &light };
+        assert_eq!(&colors(&shown(&mut page)), own, "{system}");
+        for theme in clicks {
+            page.eval("document.querySelector('#theme').click()");
+            let now = shown(&mut page);
+            assert_eq!((now["chosen"].as_str(), &now["said"]), (Some(theme), &format!("Theme: {theme}").into()), "{system}");
+            let want = match theme {
+                "dark" => &dark,
+                "light" => &light,
+                _ => own,
+            };
+            assert_eq!(&colors(&now), want, "{theme} where the system is {system}");
+        }
+    }
+}
+
 fn pictures() -> [Image; 2] {
     ["truth", "lambert"].map(|name| read_exr(&Run::shared().path(&format!("demo/{name}.exr"))).expect("reads"))
 }
