@@ -160,6 +160,47 @@ fn independent_samples_have_their_slope_and_a_cut_path_its_bias_whatever_the_thr
     assert_eq!(timeless(&again), timeless(&found));
 }
 
+/// Lights found by one way alone: the same picture, with noise of their own, and no advice.
+#[test]
+fn ways_to_find_lights_differ_in_noise_alone() {
+    let b = Bench::new();
+    let args = typed(
+        "tradeoff render --scene cornell --size 12 --samples 16,64,256 --trials 4 --ways scene,chance,aimed --seed 3 --out t",
+    );
+    let found = b.json(&args);
+    let (noise, bias) = (measure(&found, "noise"), measure(&found, "bias"));
+    let names = ["plan of the scene", "lights met by chance", "lights aimed at only"];
+    for name in names {
+        let last = &curve(&found, name)["points"][2];
+        // What the mean of four pictures is off by noise is half of one's: a bias would stand above that.
+        let [noise, bias] = [&last["errors"][noise]["value"], &last["errors"][bias]["low"]].map(number);
+        assert!(bias < 0.5 * noise, "{name}: off by {bias} at least, noise {noise}");
+        let slope = slope(&found, name, "error");
+        assert!((-0.9..-0.3).contains(&slope), "{name}: {slope}");
+        assert_eq!(theory(&found, name, "error"), ("at-most".into(), vec![-0.5]), "{name}");
+    }
+    // A lamp that fills a small part of the sky of a wall is hard to meet.
+    let [by_plan, by_chance, aimed] = names.map(|name| errors(&found, name, "error"));
+    for k in 0..3 {
+        assert!(
+            by_chance[k] > 2.0 * aimed[k] && by_chance[k] > 2.0 * by_plan[k],
+            "{by_chance:?} {aimed:?} {by_plan:?}"
+        );
+    }
+    let csv = b.text("t/tradeoff.csv");
+    assert!(names.iter().all(|name| csv.matches(name).count() >= 3), "{csv}");
+    // `render` has no option for them.
+    let text = b.ok(&[&args[..], &["--advise", "time=10m"]].concat()).text();
+    let advice = text.rsplit_once("time=10m").expect("advice").1;
+    assert!(advice.contains("(plan of the scene"), "{advice}");
+    let ran = b.run(&typed("tradeoff render --size 8 --ways luck"));
+    assert!(
+        ran.code == Some(2) && ran.err.contains("known are scene, full, independent, chance, aimed"),
+        "{}",
+        ran.err
+    );
+}
+
 #[test]
 fn readings_average_out_and_take_the_instruments_time() {
     let b = Bench::new();

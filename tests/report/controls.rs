@@ -241,7 +241,11 @@ fn the_theme_button_goes_round_and_outweighs_the_systems_scheme() {
         for theme in clicks {
             page.eval("document.querySelector('#theme').click()");
             let now = shown(&mut page);
-            assert_eq!((now["chosen"].as_str(), &now["said"]), (Some(theme), &format!("Theme: {theme}").into()), "{system}");
+            assert_eq!(
+                (now["chosen"].as_str(), &now["said"]),
+                (Some(theme), &format!("Theme: {theme}").into()),
+                "{system}"
+            );
             let want = match theme {
                 "dark" => &dark,
                 "light" => &light,
