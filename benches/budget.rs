@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use goniofit::brdf::{FitRecord, LobeKind, Material};
 use goniofit::chain::{Source, measure};
 use goniofit::control::Control;
-use goniofit::fit::{Field, FitOptions, Limit, Loss, ParameterName, Robust, RobustKind, fit};
+use goniofit::fit::{FitOptions, Loss, Robust, RobustKind, fit, rmse_of};
 use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::Measurement;
 use goniofit::numeric::random::{Purpose, RngExt, Stream, stream};
@@ -195,8 +195,7 @@ struct Cell {
 /// A fit to a part of a table.
 struct Run {
     used: f64,
-    /// By how much its rmse over all samples exceeds the full fit's, as a share; NaN under a robust loss, where all samples have an s of
-    /// their own.
+    /// By how much its rmse over all samples exceeds the full fit's, as a share; under a robust loss both at the full fit's s, for each has one of its own.
     excess: f64,
     stated: f64,
     bound: f64,
@@ -236,25 +235,22 @@ impl Cell {
 
     /// Share of the tables on which the bound holds, but for rounding.
     fn held(&self) -> f64 {
-        let holds = |run: &&Run| run.excess.is_nan() || run.excess <= run.bound + 1e-10;
+        let holds = |run: &&Run| run.excess <= run.bound + 1e-10;
         self.runs.iter().filter(holds).count() as f64 / self.runs.len() as f64
     }
 
     fn row(&self, full: f64) -> String {
         let of = |value: fn(&Run) -> f64| median(&mut self.runs.iter().map(value).collect::<Vec<f64>>());
-        let percent = |value: fn(&Run) -> f64| match of(value) {
-            x if x.is_nan() => String::new(),
-            x => format!("{:.3} %", 100.0 * x),
-        };
-        let (seconds, excess) = (of(|r| r.seconds), percent(|r| r.excess));
+        let percent = |value: fn(&Run) -> f64| format!("{:.3} %", 100.0 * of(value));
+        let seconds = of(|r| r.seconds);
         format!(
-            "{} | {:.0} | {} | {} | {} | {} | {:.1} ms | {:.2} |",
+            "{} | {:.0} | {} | {} | {} | {:.1} % | {:.1} ms | {:.2} |",
             self.name,
             of(|r| r.used),
-            excess,
+            percent(|r| r.excess),
             percent(|r| r.stated),
             percent(|r| r.bound),
-            if excess.is_empty() { String::new() } else { format!("{:.1} %", 100.0 * self.held()) },
+            100.0 * self.held(),
             1e3 * seconds,
             seconds / full
         )
@@ -266,29 +262,8 @@ fn median(values: &mut [f64]) -> f64 {
     values[values.len() / 2]
 }
 
-/// By how much the rmse over all samples of a fit to a part exceeds the full fit's.
+/// By how much the rmse over all samples of a fit to a part exceeds the full fit's, under a robust loss at the full fit's s.
 fn excess(table: &Measurement, got: &Material, whole: &FitRecord, options: &FitOptions) -> f64 {
-    if options.robust.is_some() {
-        return f64::NAN;
-    }
     let plain = FitOptions { target_rmse_excess: None, time_budget: None, ..options.clone() };
-    record(table, &held(got, plain)).rmse / whole.rmse - 1.0
-}
-
-/// The fit that holds every parameter where `at` has it: its rmse is the one over all samples.
-fn held(at: &Material, options: FitOptions) -> FitOptions {
-    let mut limits = Vec::new();
-    for lobe in &at.lobes {
-        let mut hold = |field, value| {
-            let parameter = ParameterName { kind: lobe.kind, occurrence: 0, field };
-            limits.push(Limit { parameter, low: value, high: value });
-        };
-        for (channel, weight) in CHANNELS.iter().zip(&lobe.weight) {
-            hold(Field::Weight(Some((*channel).to_owned())), *weight);
-        }
-        for (known, value) in lobe.kind.lobe().parameters().iter().zip(lobe.shape_of(0).unwrap_or_default()) {
-            hold(Field::Shape(known.name.to_owned()), value);
-        }
-    }
-    FitOptions { limits, ..options }
+    rmse_of(table, got, &plain, &whole.robust_scale).expect("an rmse") / whole.rmse - 1.0
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use goniofit::brdf::{FitRecord, LobeKind, LobeRecord, Material};
-use goniofit::fit::{Bootstrap, FitError, FitOptions, Limit, Loss, RobustKind, fit, fit_best_model};
+use goniofit::fit::{Bootstrap, FitError, FitOptions, Limit, Loss, Robust, RobustKind, fit, fit_best_model, rmse_of};
 use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::{Measurement, Weights};
 use nalgebra::{DMatrix, DVector};
@@ -489,6 +489,46 @@ fn a_time_budget_leaves_out_profiles_and_says_so() {
     assert!(record(&free).warnings.iter().all(|w| !w.contains("the time")), "{free:?}");
     let pairs = parameters(&short).into_iter().zip(parameters(&free));
     pairs.for_each(|(a, b)| assert!(rel(a, b) < 1e-6, "{a} and {b}: one start is enough here"));
+}
+
+/// The rmse of a fit is that of its material as it stands; at one s fits compare, and a fit to a part of the samples is off by what it says.
+#[test]
+fn materials_have_the_rmse_of_their_fits_and_robust_ones_compare_at_one_scale() {
+    let m = three_channels(&HEMISPHERE(5.0));
+    assert!(m.len() > 20_000, "thinned out first");
+    let with = |loss: Loss, robust: Option<Robust>, per_channel: bool| FitOptions {
+        loss,
+        robust,
+        per_channel,
+        ..options("lambert+phong")
+    };
+    let (huber, cauchy) = (robust(RobustKind::Huber), robust(RobustKind::Cauchy));
+    for o in [
+        with(Loss::L2, None, false),
+        with(Loss::Relative, None, true),
+        with(Loss::Log, huber, false),
+        with(Loss::CosineL2, cauchy, true),
+        with(Loss::CosineL2, huber, false),
+    ] {
+        let whole = solved(&m, &o);
+        let r = record(&whole);
+        let of = |material: &Material| rmse_of(&m, material, &o, &r.robust_scale).unwrap_or_else(|e| panic!("{e}"));
+        assert!(rel(of(&whole), r.rmse) < 1e-9, "{} is not {}: {o:?}", of(&whole), r.rmse);
+        let mut other = whole.clone();
+        other.lobes[1].weight.iter_mut().for_each(|w| *w *= 1.01);
+        assert!(of(&other) > r.rmse, "the fit has the least: {o:?}");
+        if o.robust.is_some() {
+            assert!(matches!(rmse_of(&m, &whole, &o, &[]), Err(FitError::Option { field: "robust", .. })));
+        }
+        if o.per_channel || o.robust.is_none() {
+            continue;
+        }
+        let part = solved(&m, &FitOptions { target_rmse_excess: Some(0.02), ..o.clone() });
+        assert!(record(&part).subset.is_some(), "a part is enough");
+        let excess = of(&part) / r.rmse - 1.0;
+        // It exceeds what was asked for once in 20, twice that hardly ever.
+        assert!((-1e-9..0.04).contains(&excess), "{excess}: {o:?}");
+    }
 }
 
 /// Without a budget the comparison takes a hundred times as long as the fit; with one, half of it at most where one model can be looked at.
