@@ -265,3 +265,28 @@ impl Sight for Cones {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_made_anew_is_the_same_and_nobody_elses() {
+        let cones = Cones::new(0.013, 0.031, None).expect("wide");
+        let read = |sight: &dyn Sight| {
+            let [wi, wo] = [0.5f64, 0.45].map(|theta| DVec3::new(theta.sin(), 0.0, theta.cos()));
+            let place = sight.place(DVec3::new(-wi.x, 0.0, wi.z), wo).expect("above the horizon");
+            let (mut value, mut slopes) = ([0.0], [vec![0.0]]);
+            sight.fill(LobeKind::Phong, &[200.0], &[place], &mut value, &mut slopes);
+            (value[0].to_bits(), slopes[0][0].to_bits())
+        };
+        let known = read(&cones);
+        // A time that is over makes nothing: what is known is there, what is made anew is not.
+        let past = Instant::now();
+        assert!(cones.prepare(LobeKind::Phong, &[200.0], past));
+        let anew = cones.anew().expect("tables are kept");
+        assert!(!anew.prepare(LobeKind::Phong, &[200.0], past));
+        assert_eq!(read(&*anew), known);
+        assert_eq!(anew.describe(), cones.describe());
+    }
+}
