@@ -85,6 +85,9 @@ pub(in crate::gonio) struct Cones {
 /// What a doubling leaves of a move where there are kinks, on average; one move alone may be small by chance.
 const LEFT: f64 = 0.25;
 
+/// Share of the accuracy asked for that a mean over what has kinks is said to be off by at least: some fall between all directions.
+const UNSEEN: f64 = 0.01;
+
 /// Directions that one rule of both cones may have: for any reading, and where a peak needs them.
 const MANY: usize = 300_000;
 const MOST: usize = 5_000_000;
@@ -128,7 +131,8 @@ impl Cones {
     }
 
     /// Writes the mean of `f`, all channels, over both cones about (wi, wo), and returns by which share it may be off: the largest relative change
-    /// that the last doubling brought; where there may be kinks, a quarter of the one before if that is more. `f` adds its values times a weight.
+    /// that the last doubling brought; where there may be kinks, a quarter of the one before if that is more, and what the narrower cone's rule leaves.
+    /// `f` adds its values times a weight.
     pub fn mean(
         &self,
         wi: DVec3,
@@ -171,15 +175,15 @@ impl Cones {
             if earlier < f64::INFINITY {
                 change = change.max(earlier);
             }
-            change = change.max(self.refine_narrower(level, &about, f, &mut before, out));
+            change = (change + self.refine_narrower(level, &about, f, &mut before, out)).max(UNSEEN * self.accuracy);
         }
         // A peak between the directions of the finest rule is not known at all.
         if needed > last { change.max(1.0) } else { change }
     }
 
-    /// The narrower cone's rule may have had the same order at level after level, so that no move told what it leaves of kinks: raises it until that is
-    /// no more than asked, by sums of the level below, whose mean by the usual orders is `before`, writes the mean anew if it needs more, and returns
-    /// what is left.
+    /// The narrower cone's rule may have had the same order at level after level, so that no move told what it leaves of kinks: doubles it until twice
+    /// what that moves is no more than asked, by sums of the level below, whose mean by the usual orders is `before`; writes the mean anew where it needs
+    /// more, and returns what is left.
     fn refine_narrower(
         &self,
         level: usize,
@@ -195,20 +199,20 @@ impl Cones {
         }
         let mut finer = vec![0.0; out.len()];
         let left = loop {
-            orders[narrower] += 1;
+            orders[narrower] *= 2;
             self.sum(orders, about, f, &mut finer);
             if finer.iter().any(|mean| mean.is_nan()) {
                 out.copy_from_slice(&finer);
                 return 0.0; // not known, as above
             }
-            let left = largest_move(&finer, before);
+            let left = 2.0 * largest_move(&finer, before);
             if left <= self.accuracy || orders[narrower] >= orders[1 - narrower] {
                 break left;
             }
             before.copy_from_slice(&finer);
         };
-        if orders[narrower] > wanted[narrower] + 1 {
-            wanted[narrower] = orders[narrower] - 1;
+        if orders[narrower] > 2 * wanted[narrower] {
+            wanted[narrower] = orders[narrower] / 2;
             self.sum(wanted, about, f, out);
         }
         left
@@ -388,19 +392,21 @@ mod tests {
     #[test]
     fn stated_errors_over_two_cones_hold_for_what_has_kinks() {
         let cases: Vec<Kinks> = (0..100).map(Kinks::random).collect();
+        let mut fine = true;
         for accuracy in [1e-2, 1e-3, 1e-4, 1e-5] {
             let (mut held, mut reached, mut worst) = (0, 0, 0.0f64);
             for case in &cases {
                 let (got, stated) = case.read(accuracy);
                 let off = (got / case.mean() - 1.0).abs();
-                held += i32::from(off <= stated + 1e-12);
+                held += i32::from(off <= stated);
                 reached += i32::from(off <= accuracy || stated > accuracy);
-                worst = worst.max(off / (stated + 1e-12));
+                worst = worst.max(off / stated);
             }
             println!(
                 "accuracy {accuracy:e}: stated errors hold in {held}, the accuracy is reached in {reached} of 100; {worst:.1} at most"
             );
-            assert!(held >= 95 && reached >= 95, "{accuracy:e}: {held} {reached}");
+            fine &= held >= 95 && reached >= 95;
         }
+        assert!(fine);
     }
 }
