@@ -36,18 +36,18 @@ pub(super) fn pass<'a>(maker: &Maker<'a>, left_out: &[&str]) -> Box<dyn Pass + '
     if source == 0.0 && detector == 0.0 && spot.is_none() {
         return Box::new(light);
     }
-    let cones = |accuracy: f64, kinked: bool| {
-        let cones = Cones::new([source, detector], accuracy, kinked, maker.dimension);
+    let cones = |accuracy: f64| {
+        let cones = Cones::new([source, detector], accuracy, maker.dimension);
         if let Some(order) = maker.order { cones.fixed(order) } else { cones }
     };
-    let late = maker.deadline.map(|deadline| (deadline, cones(COARSEST, false)));
+    let late = maker.deadline.map(|deadline| (deadline, cones(COARSEST)));
     // Half of the error is the spot's, half that of what its points see.
     let accuracy = if spot.is_some() { 0.5 * maker.accuracy } else { maker.accuracy };
     let lobes = Lobes::of(maker, (source, detector), accuracy).filter(|_| maker.order.is_none());
     // The coarsest accuracy takes the lowest orders that there are, whatever they leave.
-    let cones = cones(accuracy, maker.kinked && maker.accuracy < COARSEST);
+    let kinked = maker.kinked && maker.accuracy < COARSEST;
     let order = maker.order.map(|order| order as usize);
-    Box::new(Spread { light, cones, spot, accuracy, order, late, lobes, stop: maker.stop })
+    Box::new(Spread { light, cones: cones(accuracy), kinked, spot, accuracy, order, late, lobes, stop: maker.stop })
 }
 
 /// A truth that is a sum of lobes, of which means over both cones are known without a sum over directions.
@@ -160,6 +160,8 @@ impl Pass for Light<'_> {
 struct Spread<'a> {
     light: Light<'a>,
     cones: Cones,
+    /// Whether the truth may have kinks that are to be looked for.
+    kinked: bool,
     spot: Option<Spot>,
     accuracy: f64,
     /// The only order, where it is set.
@@ -196,7 +198,8 @@ impl Spread<'_> {
             *evaluations += 1;
             self.light.add(kind, (wi, wo), gain * weight, &mut f, out);
         };
-        let mut sum = |out: &mut [f64]| how.late.unwrap_or(&self.cones).mean(wi, wo, &mut add, out);
+        let kinked = self.kinked && how.late.is_none() && kind == Kind::Sample;
+        let mut sum = |out: &mut [f64]| how.late.unwrap_or(&self.cones).mean(wi, wo, kinked, &mut add, out);
         match self.lobes.as_ref().filter(|_| kind == Kind::Sample) {
             Some(lobes) => lobes.mean((wi, wo), gain, how, out, sum),
             None => sum(out),
