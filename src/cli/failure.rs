@@ -78,7 +78,8 @@ impl From<FitError> for Failure {
         match error {
             FitError::Option { .. } => Self::usage(format!("--{message}")),
             FitError::Infeasible { .. } => Self::usage(format!("--conserve-energy: {message}")),
-            FitError::Limit { .. }
+            FitError::Channels { .. }
+            | FitError::Limit { .. }
             | FitError::LimitTwice { .. }
             | FitError::Overflow { .. }
             | FitError::Underflow { .. } => Self::usage(message),

@@ -15,7 +15,8 @@ use crate::measurement::Measurement;
 /// fit's `robust_scale` has them. Fits compare at one s, not each at its own.
 ///
 /// # Errors
-/// [`FitError`] where the options are wrong, nothing valid is left, or there are not as many `scales` as are needed.
+/// [`FitError`] where the channels are not the measurement's, the options are wrong, nothing valid is left, or there are not as many `scales` as are
+/// needed.
 pub fn rmse_of(
     measurement: &Measurement,
     material: &Material,
@@ -23,6 +24,7 @@ pub fn rmse_of(
     scales: &[f64],
 ) -> Result<f64, FitError> {
     let wrong = |e: SpecError| FitError::Solver { reason: e.to_string() };
+    same_channels(measurement, material)?;
     let model: ModelSpec = material.model().parse().map_err(wrong)?;
     let options = FitOptions { model, limits: Vec::new(), ..options.clone() };
     options.validate(measurement)?;
@@ -40,10 +42,10 @@ pub fn rmse_of(
             gathered => gathered?,
         };
         let unit = options.loss.cost_unit(samples.scale);
-        let saturation = saturation(&options, scales.get(g).map(|s| s / unit.sqrt()))?;
+        let loss = saturation(&options, scales.get(g).map(|s| s / unit.sqrt()))?;
         let problem = Problem::new(&samples, &model, &ranges, false);
         let (lobes, weights) = (shaped(&problem, material, group[0]), weights(material, group, samples.scale));
-        let sums = passes::sums(&samples, &lobes, &weights, saturation, Want::Gradient);
+        let sums = passes::sums(&samples, &lobes, &weights, loss, Want::Gradient);
         cost += unit * sums.iter().map(|s| s.cost).sum::<f64>();
         residuals += samples.residuals();
     }
@@ -51,6 +53,15 @@ pub fn rmse_of(
         Some(error) => Err(error),
         None => Ok((cost / residuals as f64).sqrt()),
     }
+}
+
+/// Channels go by place: they must have the same names in the same order.
+fn same_channels(measurement: &Measurement, material: &Material) -> Result<(), FitError> {
+    if material.channels == measurement.channels {
+        return Ok(());
+    }
+    let [own, others] = [&material.channels, &measurement.channels].map(|names| names.join(", "));
+    Err(FitError::Channels { material: own, measurement: others })
 }
 
 /// The robust loss with its s, in the fit's scale.
@@ -68,7 +79,7 @@ fn saturation(options: &FitOptions, scale: Option<f64>) -> Result<Saturation, Fi
 
 /// The lobes as they are in a channel; one without weight in all, which has no shape, may have any.
 fn shaped(problem: &Problem<'_>, material: &Material, channel: usize) -> Vec<ShapedLobe> {
-    let any = |kind: crate::brdf::LobeKind| vec![1.0; kind.lobe().parameters().len()];
+    let any = |kind: LobeKind| vec![1.0; kind.lobe().parameters().len()];
     let of = |(kind, term): (&LobeKind, &LobeTerm)| ShapedLobe {
         kind: *kind,
         shape: term.shape_of(channel).unwrap_or_else(|| any(*kind)),

@@ -187,6 +187,14 @@ pub enum FitError {
         /// What was given.
         found: String,
     },
+    /// A material of other channels than the measurement's.
+    #[error("channels of the material: expected {measurement}, as the measurement has them, found {material}")]
+    Channels {
+        /// Those of the material.
+        material: String,
+        /// Those of the measurement.
+        measurement: String,
+    },
     /// A limit that fits nothing.
     #[error("{name}: expected {expected}, found {found}")]
     Limit {

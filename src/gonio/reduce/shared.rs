@@ -14,6 +14,9 @@ use crate::gonio::instrument::Instrument;
 /// Most components of one kind of visits' errors, and most numbers that all may take.
 const MOST_GROUPS: usize = 6;
 const MOST_NUMBERS: usize = 50_000_000;
+/// Most exposures whose errors have a component each, and how many have one however large the scan: more than a bracket has.
+const MOST_EXPOSURES: usize = 12;
+const FEWEST_EXPOSURES: usize = 3;
 /// Terms of the series of a walk that is known at both ends, and times that one is cut in halves that is known at its beginning.
 const MODES: usize = 2;
 const HALVINGS: u32 = 3;
@@ -67,8 +70,9 @@ pub(super) struct Shared<'a> {
     places: std::collections::HashMap<(usize, usize, usize), usize>,
     /// Visits to the base, and to the reference, that are one component.
     groups: [usize; 2],
-    /// Exposures whose errors have a component.
+    /// Exposures whose errors have a component, and how many may have one.
     exposures_s: Vec<f64>,
+    most_exposures: usize,
     has_reference: bool,
     /// When the last reading was made.
     end_s: f64,
@@ -132,6 +136,7 @@ impl<'a> Shared<'a> {
             places: std::collections::HashMap::new(),
             groups: visits.len().map(|count| count.div_ceil(afforded).max(1)),
             exposures_s: Vec::new(),
+            most_exposures: (MOST_NUMBERS / size.max(1)).clamp(FEWEST_EXPOSURES, MOST_EXPOSURES),
             has_reference: visits.has[1],
             end_s,
         }
@@ -167,21 +172,25 @@ impl<'a> Shared<'a> {
         add_at(&mut self.of_stops, self.size, place, u);
     }
 
-    /// The part of each reading's own σ that its channels share, channel-major: what a stop does, and drift between visits. None where there is no such
-    /// part.
+    /// The part of each reading's own σ that its channels share, channel-major: what a stop does, drift between visits, and exposures that are its own. None
+    /// where there is no such part.
     pub fn row(&self, table: &Table, width: usize) -> Option<Vec<f64>> {
         let entries = self.size / width.max(1);
         let part = |family: usize, place: usize| self.families[family].own.get(place).copied().unwrap_or(0.0).sqrt();
         let parts = |place: usize| {
             let drift = part(DRIFT, place).copysign(table.values[place]);
-            [self.of_stops.get(place).copied().unwrap_or(0.0), drift, part(DARK, place)]
+            let mut parts = vec![self.of_stops.get(place).copied().unwrap_or(0.0), drift, part(DARK, place)];
+            if !self.families[EXPOSURES].own.is_empty() {
+                parts.push(part(EXPOSURES, place).copysign(table.values[place]));
+            }
+            parts
         };
         let is_there = width > 1 && (0..self.size).any(|place| parts(place).iter().any(|u| *u != 0.0));
         let mut row = vec![0.0; if is_there { self.size } else { 0 }];
         for entry in 0..if is_there { entries } else { 0 } {
             let places = (0..width).map(|c| c * entries + entry);
             let valid: Vec<usize> = places.filter(|place| table.values[*place].is_finite()).collect();
-            let patterns: Vec<Vec<f64>> = valid.iter().map(|place| parts(*place).to_vec()).collect();
+            let patterns: Vec<Vec<f64>> = valid.iter().map(|place| parts(*place)).collect();
             valid.iter().zip(alike(&patterns)).for_each(|(place, u)| row[*place] = u);
         }
         let masked = |(u, value): (f64, &f64)| if value.is_nan() { f64::NAN } else { u };
@@ -255,29 +264,49 @@ impl<'a> Shared<'a> {
     }
 
     /// Adds what errors of exposure times do to one reading: each exposure has its own, in all that was read in it. What sample, reference and base share
-    /// cancels in their ratio.
+    /// cancels in their ratio. Exposures beyond the most that have a component are of an instrument that sets them anew each time: the error of one is
+    /// the reading's own, or the visit's.
     fn exposures(&mut self, place: usize, of: &Reduced) {
         let Reduced { value, conversion, rate, ref at, .. } = *of;
         let detector = &self.instrument.detector;
         let own = Timed::new(rate.exposure_s, rate.mean, detector.offset);
-        let of_reference = at.reference_parts.iter().map(|p| (p.timed, -value / at.reference * p.share));
-        let of_base = at.base_parts.iter().map(|p| (p.timed, p.sensitivity(value / at.reference, conversion)));
-        let parts: Vec<(Timed, f64)> = std::iter::once((own, conversion)).chain(of_reference).chain(of_base).collect();
-        if self.has_reference && parts.iter().all(|(timed, _)| are_same(timed.exposure_s, rate.exposure_s)) {
+        // Parts 1 and up of the family are visits', 0 is an exposure's.
+        let of_reference =
+            at.reference_parts.iter().map(|p| (p.timed, -value / at.reference * p.share, (OF_REFERENCE, p.visit, 1)));
+        let of_base = at
+            .base_parts
+            .iter()
+            .map(|p| (p.timed, p.sensitivity(value / at.reference, conversion), (OF_BASE, p.visit, 2 + p.list)));
+        let parts: Vec<_> = of_reference.chain(of_base).collect();
+        let is_own = |timed: Timed| are_same(timed.exposure_s, rate.exposure_s);
+        if self.has_reference && parts.iter().all(|(timed, ..)| is_own(*timed)) {
             return;
         }
-        for (Timed { exposure_s, rate }, sensitivity) in parts {
-            let component = self.exposure(exposure_s);
-            self.add(EXPOSURES, (component, 0), place, detector.exposure_u * sensitivity * rate);
+        // What a reading has of an exposure that is its own alone.
+        let mut alone = 0.0;
+        let mut add = |(timed, sensitivity): (Timed, f64), visit: Option<(usize, usize, usize)>| {
+            let u = detector.exposure_u * sensitivity * timed.rate;
+            match (self.exposure(timed.exposure_s), visit.filter(|_| !is_own(timed))) {
+                (Some(component), _) => self.add(EXPOSURES, (component, 0), place, u),
+                (None, Some((kind, visit, part))) => self.add_grouped((EXPOSURES, kind), visit, part, place, u),
+                (None, None) => alone += u,
+            }
+        };
+        add((own, conversion), None);
+        parts.into_iter().for_each(|(timed, sensitivity, visit)| add((timed, sensitivity), Some(visit)));
+        if alone != 0.0 {
+            self.add_own(EXPOSURES, place, alone * alone);
         }
     }
 
-    /// The number of an exposure.
-    fn exposure(&mut self, exposure_s: f64) -> usize {
+    /// The number of an exposure that has a component; none where as many have one as may.
+    fn exposure(&mut self, exposure_s: f64) -> Option<usize> {
         let found = self.exposures_s.iter().position(|known| are_same(*known, exposure_s));
-        found.unwrap_or_else(|| {
-            self.exposures_s.push(exposure_s);
-            self.exposures_s.len() - 1
+        found.or_else(|| {
+            (self.exposures_s.len() < self.most_exposures).then(|| {
+                self.exposures_s.push(exposure_s);
+                self.exposures_s.len() - 1
+            })
         })
     }
 

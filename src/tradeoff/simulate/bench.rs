@@ -57,9 +57,10 @@ pub fn relative_change(values: &[f64], reference: &[f64]) -> f64 {
     f64::sqrt(sum / count)
 }
 
-/// The largest relative change |x − r|/|r| over pairs of which both are numbers and r is not 0.
+/// The largest relative change |x − r|/|r| over pairs of which both are numbers; where r is 0 and x is not, it counts as 1.
 pub(in crate::tradeoff) fn largest_change(values: &[f64], reference: &[f64]) -> f64 {
-    let changes = values.iter().zip(reference).map(|(x, r)| ((x - r) / r).abs());
+    let change = |(x, r): (&f64, &f64)| if *r == 0.0 && *x != 0.0 { x.signum().abs() } else { ((x - r) / r).abs() };
+    let changes = values.iter().zip(reference).map(change);
     changes.filter(|change| change.is_finite()).fold(0.0, f64::max)
 }
 
@@ -303,6 +304,14 @@ mod tests {
         let found = relative_change(&[1.0, 0.0, f64::NAN, 0.0, -1.0], &[2.0, 3.0, 1.0, 0.0, 1.0]);
         // ½, 1, –, 0, 2: a change of sign is the only one above 1.
         assert!((found - ((0.25 + 1.0 + 4.0) / 4.0f64).sqrt()).abs() < 1e-15, "{found}");
+    }
+
+    #[test]
+    fn the_largest_change_counts_what_is_read_where_nothing_is() {
+        assert_eq!(largest_change(&[1.5, 2.0], &[1.0, 2.0]), 0.5);
+        assert_eq!(largest_change(&[1.5, 1e-9], &[1.0, 0.0]), 1.0);
+        assert_eq!(largest_change(&[3.0, -1e-9], &[1.0, 0.0]), 2.0);
+        assert_eq!(largest_change(&[0.0, f64::NAN, 1.0, f64::NAN], &[0.0, 1.0, f64::NAN, 0.0]), 0.0);
     }
 
     /// Raw readings are large, and rounds may be many.

@@ -16,7 +16,7 @@ use crate::tradeoff::knob::Knob;
 const DIM: f64 = 0.5;
 /// Relative errors of parameters up to which a fit is linear in noise.
 const LINEAR: f64 = 0.1;
-/// n h² of a lobe's exponent n and the step h up to which a sum of cos²ⁿα in steps is its integral: off by 2 exp(−π²/(n h²)), 4 %.
+/// n h² of a lobe's exponent n and the step h up to which a sum of cos²ⁿα in steps is its integral: off by 2 exp(−π²/(n h²)), 4.5 %.
 const RESOLVED: f64 = 2.6;
 
 /// What trials of a knob showed.

@@ -73,6 +73,8 @@ pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) ->
     let began = Instant::now();
     let mut bench = Bench::new(what, effort.seed, control);
     let (mut series, settings) = design(what);
+    // Steps that a scan does not take are not tried.
+    let steps: Vec<f64> = what.steps.iter().copied().filter(|step| stepped(what.scan, *step).is_some()).collect();
     let mut shown = vec![Shown::NOTHING; series.len()];
     let runs = run(&settings, effort, control, |index, turn| {
         let (trial, own) = bench.trial(&settings[index].what, turn)?;
@@ -81,7 +83,7 @@ pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) ->
         Ok::<_, ChainError>(trial)
     })?;
     for (series, shown) in series.iter_mut().zip(shown) {
-        let laws = laws::of(series.knob, (what.instrument, what.source), &what.steps, shown);
+        let laws = laws::of(series.knob, (what.instrument, what.source), &steps, shown);
         series.laws = laws.unwrap_or_else(|| std::mem::take(&mut series.laws));
     }
     let found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
