@@ -89,7 +89,7 @@ pub trait Sight: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// The same with nothing made yet that [`Self::fill`] keeps, so that what it takes to make it can be measured; `None` where nothing is kept.
+    /// The same sight before anything was made for [`Self::fill`]: of it a first fit's time can be measured. `None` where nothing is kept.
     fn anew(&self) -> Option<Arc<dyn Sight>> {
         None
     }

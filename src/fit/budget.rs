@@ -151,6 +151,9 @@ pub(super) fn tell(record: &mut FitRecord, parts: &[Part], options: &FitOptions,
             .warnings
             .push("the time ended the search early: other minima were not looked for, or not followed".into());
     }
+    if parts.iter().any(|p| p.report.unsettled) {
+        record.warnings.push("the time ended while the robust scale settled".into());
+    }
     if parts.iter().any(|p| p.lacks_profiles) {
         let said = "the time left out profiles: where intervals need one they are estimate ± t·σ, which may be too short there";
         record.warnings.push(said.into());

@@ -98,6 +98,10 @@ impl Compared {
         if !not.is_empty() {
             list.push(format!("the time ended the comparison of models before {} were looked at", not.join(", ")));
         }
+        let cut: Vec<&str> = self.tried.iter().filter(|t| t.is_cut).map(|t| t.candidate.model.as_str()).collect();
+        if !cut.is_empty() {
+            list.push(format!("the time ended the comparison of models before all was done for {}", cut.join(", ")));
+        }
         let part = self.tried.first().and_then(|t| t.part).filter(|_| self.entries < SAMPLES.min(measurement.len()));
         list.extend(part.map(|part| format!("the time left {part} directions for the comparison of models")));
         list
@@ -113,22 +117,23 @@ fn compare(
 ) -> Result<Compared, FitError> {
     let richest_first: Vec<usize> = (0..models.len()).rev().collect();
     let Some(budget) = options.time_budget else {
-        let tried = compare_on(SAMPLES, models, &richest_first, measurement, options, None)?;
+        let tried = compare_on((SAMPLES, &richest_first), models, measurement, options, &Haste::NONE)?;
         return Ok(Compared { tried, entries: SAMPLES });
     };
     let time = budget.mul_f64(COMPARISON);
     let late = |more: Duration| clock.elapsed() + more > time;
+    let deadline = Deadline::of(clock, Some(budget));
     let mut entries = FIRST;
     loop {
         let began = Instant::now();
         let all = entries >= SAMPLES.min(measurement.len());
-        let (order, late_for): (&[usize], Option<&dyn Fn(Duration) -> bool>) =
+        let (order, late): (&[usize], Option<&dyn Fn(Duration) -> bool>) =
             if entries == FIRST { (&IN_HASTE, Some(&late)) } else { (&richest_first, None) };
-        match compare_on(entries, models, order, measurement, options, late_for) {
+        match compare_on((entries, order), models, measurement, options, &Haste { late, deadline }) {
             Err(FitError::NothingToFit { .. }) if !all => {} // what counts may be among the others
             Ok(tried) => {
                 let cut = tried.len() < models.len();
-                if all || cut || late(began.elapsed().mul_f64(GROWTH as f64)) {
+                if all || cut || deadline.is_past() || late(began.elapsed().mul_f64(GROWTH as f64)) {
                     return Ok(Compared { tried, entries });
                 }
             }
@@ -138,15 +143,25 @@ fn compare(
     }
 }
 
-/// Models' errors on so many entries of the measurement, simplest first; those that `late` says would end too late are left out, the first
-/// in `order` never.
+/// What the time asks of a comparison.
+struct Haste<'a> {
+    /// Whether what takes so long more would end too late; models of which it is so are left out.
+    late: Option<&'a dyn Fn(Duration) -> bool>,
+    /// When the searches within a model end.
+    deadline: Deadline,
+}
+
+impl Haste<'_> {
+    const NONE: Self = Self { late: None, deadline: Deadline::NEVER };
+}
+
+/// Models' errors on so many entries of the measurement, simplest first; of those that would end too late none, but the first in `order`.
 fn compare_on(
-    entries: usize,
+    (entries, order): (usize, &[usize]),
     models: &[ModelSpec],
-    order: &[usize],
     measurement: &Measurement,
     options: &FitOptions,
-    late: Option<&dyn Fn(Duration) -> bool>,
+    haste: &Haste<'_>,
 ) -> Result<Vec<Tried>, FitError> {
     let mut numbered = Vec::new();
     // The first one's residuals set the robust scale by which all are judged.
@@ -156,12 +171,12 @@ fn compare_on(
         let began = Instant::now();
         let glossy = model.lobes().iter().filter(|k| !k.lobe().parameters().is_empty()).count();
         let needed = of_one_lobe.map(|time: Duration| time.mul_f64(STEEP.powi(glossy as i32 - 1)));
-        if late.zip(needed).is_some_and(|(late, needed)| late(needed)) {
+        if haste.late.zip(needed).is_some_and(|(late, needed)| late(needed)) {
             continue;
         }
         let limits = options.limits.iter().filter(|l| concerns(l, model, measurement)).cloned().collect();
         let own = FitOptions { model: model.clone(), limits, bootstrap: None, time_budget: None, ..options.clone() };
-        let tried = candidate(measurement, &own, entries, &mut common);
+        let tried = candidate(measurement, &own, (entries, haste.deadline), &mut common);
         timed::check(options)?;
         numbered.push((place, tried?));
         if glossy == 1 {
@@ -183,7 +198,7 @@ fn compare_on(
 fn candidate(
     measurement: &Measurement,
     options: &FitOptions,
-    entries: usize,
+    (entries, deadline): (usize, Deadline),
     common: &mut Option<Vec<Saturation>>,
 ) -> Result<Tried, FitError> {
     let model = options.model_for(measurement)?;
@@ -197,12 +212,13 @@ fn candidate(
     let (mut total, mut held_out, mut residuals, mut parameters) = (0.0, vec![(0.0, 0usize); FOLDS], 0, 0);
     let mut effective = Some(0.0);
     let mut energy = 0.0;
-    let (mut own, mut directions) = (Vec::new(), 0);
+    let (mut own, mut directions, mut is_cut) = (Vec::new(), 0, false);
     for (k, group) in groups.into_iter().enumerate() {
         let (samples, _) = Samples::gather(measurement, &model, options, group, thin)?;
         let samples = samples.listed(|_| true);
         let unit = options.loss.cost_unit(samples.scale);
-        let whole = part::fit(&samples, None, &model, &ranges, options, Deadline::NEVER)?;
+        let whole = part::fit(&samples, None, &model, &ranges, options, deadline)?;
+        is_cut |= whole.is_cut();
         own.push(whole.saturation);
         let saturation = common.as_ref().map_or(whole.saturation, |list| list[k]);
         let cost_on = |at: &Solution, on: &Samples<'_>| unit * cost(at, on, saturation.zip(options.robust));
@@ -237,7 +253,7 @@ fn candidate(
     };
     let held_out = held_out.into_iter().filter(|(_, n)| *n > 0);
     let part = (thin.step > 1).then_some(directions as u64);
-    Ok(Tried { candidate, effective, rounding, folds: held_out.map(rms).collect(), part })
+    Ok(Tried { candidate, effective, rounding, folds: held_out.map(rms).collect(), part, is_cut })
 }
 
 /// Σ w r². Under a robust loss an outlier counts as much as one sample can, for its own size says nothing of a model: Σ w s²/3 ρ with Tukey's
@@ -272,6 +288,8 @@ struct Tried {
     folds: Vec<f64>,
     /// Directions looked at, where not all were.
     part: Option<u64>,
+    /// Whether the time left something of its search out.
+    is_cut: bool,
 }
 
 impl Tried {
@@ -382,7 +400,7 @@ mod tests {
         let model = model.into();
         let (aicc, bic) = (0.0, 0.0);
         let candidate = ModelCandidate { model, parameters, rmse: held_out_rmse, held_out_rmse, aicc, bic };
-        Tried { candidate, effective: None, rounding: 1e-13, folds: vec![held_out_rmse; FOLDS], part: None }
+        Tried { candidate, effective: None, rounding: 1e-13, folds: vec![held_out_rmse; FOLDS], part: None, is_cut: false }
     }
 
     #[test]

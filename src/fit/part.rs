@@ -63,7 +63,7 @@ pub(super) struct Part {
 impl Part {
     /// Whether the time left something out.
     pub fn is_cut(&self) -> bool {
-        self.report.cut || self.lacks_profiles
+        self.report.cut || self.report.unsettled || self.lacks_profiles
     }
 
     /// What stands for channels without a valid sample, each fitted alone: no weight that is not demanded, nothing determined that is not
@@ -146,7 +146,7 @@ pub(super) fn refit(
 
 /// A loss that is linear in the weights, without outliers: everything from the transforms, last digits from true residuals.
 fn by_search(search: &Search<'_>, options: &FitOptions) -> Result<Part, FitError> {
-    let found = start::search(search, options.max_iterations)?;
+    let found = start::search(search, options.max_iterations, Deadline::NEVER)?;
     let mut solution = search.solve(found.outcome.parameters.as_slice());
     let energy: f64 = search.energy.iter().sum();
     if solution.cost < LOST_COST * energy || condition(search, &solution) > LOST_CONDITION {
@@ -227,6 +227,7 @@ fn by_passes(problem: &Problem<'_>, options: &FitOptions, deadline: Deadline) ->
         let near = (&judged.solution, met);
         let Some(moved) = robust::resettle(&problem, near, lower, options, deadline) else { break };
         (problem.saturation, met) = (moved.saturation, moved.met);
+        found.report.unsettled = !met && deadline.is_past();
         judged = judge(&problem, &more, &start::ordered(&problem, moved.at), options, deadline)?;
     }
     if judged.lower.is_some() {

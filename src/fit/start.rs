@@ -41,6 +41,8 @@ pub(super) struct SearchReport {
     pub unseen: Option<f64>,
     /// Whether the time left some starts out.
     pub cut: bool,
+    /// Whether the time ended while s settled.
+    pub unsettled: bool,
 }
 
 /// The lowest minimum, and how it was found.
@@ -121,12 +123,12 @@ impl Nodes {
     }
 }
 
-/// The lowest minimum of a problem that the transforms know.
-pub(super) fn search(search: &Search<'_>, steps: u64) -> Result<Found, FitError> {
-    search_with(search, steps, RANDOM_STARTS)
+/// The lowest minimum of a problem that the transforms know; after `deadline` that next to the lattice's best node alone.
+pub(super) fn search(search: &Search<'_>, steps: u64, deadline: Deadline) -> Result<Found, FitError> {
+    search_with(search, steps, RANDOM_STARTS, deadline)
 }
 
-fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, FitError> {
+fn search_with(search: &Search<'_>, steps: u64, random: usize, deadline: Deadline) -> Result<Found, FitError> {
     let problem = search.problem;
     let mut starts = match problem.layout.len() {
         0 => vec![Vec::new()],
@@ -137,20 +139,27 @@ fn search_with(search: &Search<'_>, steps: u64, random: usize) -> Result<Found, 
             nodes.combinations(usize::MAX, |set| lattice.cost(problem, set)) // pairs in full
         }
     };
-    if problem.layout.len() > 1 {
+    let several = problem.layout.len() > 1;
+    let mut cut = (several || starts.len() > 1) && deadline.is_past();
+    if cut {
+        starts.truncate(1);
+    } else if several {
         // A lobe more can only help: from the smaller model's optimum the larger one never ends above it.
         let smaller = problem.with_shapes(problem.layout.len() - 1);
-        let found = search_with(&search.of(&smaller), steps, 0)?;
+        let found = search_with(&search.of(&smaller), steps, 0, deadline)?;
+        cut |= found.report.cut;
         let cost = |t: &[f64]| search.solve(t).cost;
         starts.push(extended(problem, found.outcome.parameters.as_slice(), cost));
     }
     let lattice = starts.len();
-    if problem.layout.len() > 1 {
-        starts.extend(drawn(problem, random));
+    if several && !cut {
+        cut = random > 0 && deadline.is_past();
+        starts.extend(drawn(problem, if cut { 0 } else { random }));
     }
     let run = |start: &Vec<f64>| polish_start(search.walk(), problem, start.clone(), steps);
     let outcomes = starts.par_iter().map(run).collect::<Result<Vec<Outcome>, FitError>>()?;
     let mut best = best_of(outcomes, lattice)?;
+    best.report.cut = cut;
     if random > 0 && !problem.layout.is_empty() {
         order_alike(problem, &mut best.outcome);
         // The shapes' last digits, where the cost itself no longer tells points apart.
@@ -239,7 +248,7 @@ pub(super) fn search_plain(
         return search_streamed(few, more, steps, deadline);
     }
     let (transform, energy) = passes::transform(problem.samples);
-    search(&Search::new(problem, &transform, &energy), steps)
+    search(&Search::new(problem, &transform, &energy), steps, deadline)
 }
 
 fn polish_start(at: impl Linearize, problem: &Problem<'_>, start: Vec<f64>, steps: u64) -> Result<Outcome, FitError> {
@@ -295,6 +304,7 @@ fn best_of(outcomes: Vec<Outcome>, lattice: usize) -> Result<Found, FitError> {
         runner_up_excess: costs.get(1).filter(|_| lowest > 0.0).map(|c| c / lowest - 1.0),
         unseen,
         cut: false,
+        unsettled: false,
     };
     let outcome = outcomes.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     outcome.map(|outcome| Found { outcome, report }).ok_or_else(|| FitError::Solver { reason: "no start".into() })

@@ -58,7 +58,7 @@ pub(super) fn settle(
     let (begun, mut report) = settling.begin(few, more, plain)?;
     problem.saturation = begun.saturation;
     let (at, met) = settling.follow(problem, begun.at, aim(problem))?;
-    report.cut |= !met && deadline.is_past();
+    report.unsettled |= !met && deadline.is_past();
     Ok((at, met, report))
 }
 

@@ -412,3 +412,87 @@ fn add_at(list: &mut Vec<f64>, size: usize, place: usize, variance: f64) {
     }
     list[place] += variance;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gonio::raw::Raw;
+    use crate::gonio::reduce::stops::Rate;
+    use crate::gonio::reduce::visits::{At, ReferencePart};
+    use crate::measurement::{Dimension, Directions, Weights};
+
+    const EXPOSURE_U: f64 = 0.01;
+
+    fn nothing_read() -> Raw {
+        Raw {
+            channels: vec!["y".into()],
+            dimension: Dimension::Space,
+            directions: Directions::List { wi: vec![], wo: vec![] },
+            weights: Weights::Uniform,
+            readings: vec![],
+            signal: vec![],
+            quadrature_error: 0.0,
+            notes: vec![],
+        }
+    }
+
+    /// A reading of value 1, beside a reference as bright in another exposure: 1 σ of either is `EXPOSURE_U`.
+    fn reduced(own_s: f64, reference_s: f64, visit: usize) -> Reduced {
+        let rate = Rate { mean: 1000.0, variance: 0.0, signal: 1000.0, exposure_s: own_s };
+        let timed = Timed::new(reference_s, 1000.0, 0.0);
+        let gap = Gap::default();
+        let at = At {
+            base: 0.0,
+            reference: 1000.0,
+            base_parts: vec![],
+            reference_parts: vec![ReferencePart { visit, share: 1.0, sigma: 0.0, timed }],
+            base_bent: 0.0,
+            reference_bent: 0.0,
+            base_gap: gap,
+            reference_gap: gap,
+        };
+        Reduced { value: 1.0, conversion: 1e-3, rate, at, time_s: 0.0 }
+    }
+
+    /// An instrument that sets exposures anew each time has as many as readings and visits; memory does not grow with them, and no variance is lost.
+    #[test]
+    fn exposures_without_end_have_a_few_components_and_all_of_their_variance() {
+        const READINGS: usize = 200;
+        let mut instrument = Instrument::default();
+        instrument.detector.exposure_u = EXPOSURE_U;
+        let visits = Visits::new(&[], &nothing_read(), &instrument).expect("nothing to refuse");
+        for (is_set_anew, most) in [(false, MOST_EXPOSURES), (true, MOST_EXPOSURES + MOST_GROUPS)] {
+            let mut shared = Shared::new(READINGS, 1, (&visits, 0.0), &instrument);
+            // Of 20 visits four in a row are one component.
+            (shared.has_reference, shared.groups) = (true, [1, 4]);
+            for i in 0..READINGS {
+                let visit = i / 10;
+                let reference_s = if is_set_anew { 100.0 + visit as f64 } else { 0.5 };
+                shared.exposures(i, &reduced(1.0 + 0.1 * i as f64, reference_s, visit));
+            }
+            let own = shared.families[EXPOSURES].own.clone();
+            let planes = shared.planes();
+            assert!(planes.len() <= most, "{} components", planes.len());
+            for i in 0..READINGS {
+                let shares: f64 = planes.iter().map(|plane| plane[i] * plane[i]).sum();
+                let want = 2.0 * EXPOSURE_U * EXPOSURE_U;
+                assert!(((own[i] + shares) / want - 1.0).abs() < 1e-12, "reading {i}: {} and {shares}", own[i]);
+            }
+        }
+    }
+
+    /// A reading in the reference's exposure is as exact as without any error of it, whichever exposures had a component before.
+    #[test]
+    fn an_exposure_shared_with_the_reference_cancels_beyond_the_most_too() {
+        let mut instrument = Instrument::default();
+        instrument.detector.exposure_u = EXPOSURE_U;
+        let visits = Visits::new(&[], &nothing_read(), &instrument).expect("nothing to refuse");
+        let mut shared = Shared::new(30, 1, (&visits, 0.0), &instrument);
+        shared.has_reference = true;
+        (0..29).for_each(|i| shared.exposures(i, &reduced(1.0 + i as f64, 0.5, 0)));
+        let components = shared.components.len();
+        shared.exposures(29, &reduced(77.0, 77.0, 1));
+        assert_eq!((shared.components.len(), shared.families[EXPOSURES].own[29]), (components, 0.0));
+        assert!(shared.components.iter().all(|c| c.plane[29] == 0.0));
+    }
+}

@@ -3,7 +3,7 @@
 use crate::brdf::{Material, ModelSpec};
 use crate::chain::{ChainError, Source, Stage, render_material, scene};
 use crate::control::Control;
-use crate::fit::{Field, FitOptions, Limit, ParameterName, fit, rmse_of};
+use crate::fit::{FitOptions, fit, rmse_of};
 use crate::measurement::{Dimension, Measurement};
 use crate::render::{self, Film, Options};
 
@@ -29,6 +29,7 @@ pub(super) struct Yardstick<'a> {
 
 struct Whole {
     material: Material,
+    /// By the yardstick's own way, once there is one.
     rmse: f64,
     picture: Option<Film>,
     model: String,
@@ -48,9 +49,8 @@ impl<'a> Yardstick<'a> {
         };
         let whole = |model: &ModelSpec| {
             let material = fit(measurement, &FitOptions { model: model.clone(), ..plain.clone() })?.material;
-            let rmse = material.fit.as_ref().map_or(f64::NAN, |record| record.rmse);
             Ok::<_, ChainError>(Whole {
-                rmse,
+                rmse: f64::NAN,
                 picture: picture(measurement, &material),
                 material,
                 model: model.to_string(),
@@ -59,10 +59,8 @@ impl<'a> Yardstick<'a> {
         let whole = models.iter().map(whole).collect::<Result<Vec<_>, _>>()?;
         let scales = least_scales(&whole);
         let mut found = Self { measurement, options: plain, whole, best: f64::NAN, scales };
-        if found.evaluates() {
-            for k in 0..found.whole.len() {
-                found.whole[k].rmse = found.rmse(&found.whole[k].material)?;
-            }
+        for k in 0..found.whole.len() {
+            found.whole[k].rmse = found.rmse(&found.whole[k].material)?;
         }
         found.best = found.whole.iter().map(|w| w.rmse).fold(f64::INFINITY, f64::min);
         Ok(found)
@@ -91,23 +89,9 @@ impl<'a> Yardstick<'a> {
         Ok(if is_rounding { errors.into_iter().map(|e| 0.0 * e).collect() } else { errors })
     }
 
-    /// Whether an rmse is worked out as it stands: a fit that holds every parameter would have an s of its own, the same shapes in all channels, or
-    /// weights a rounding beyond the energy limit.
-    fn evaluates(&self) -> bool {
-        let FitOptions { robust, per_channel, conserve_energy, .. } = self.options;
-        robust.is_some() || per_channel || conserve_energy
-    }
-
-    /// The rmse over all samples of a material: else that of a fit which holds every parameter.
+    /// The rmse over all samples of a material as it stands.
     fn rmse(&self, material: &Material) -> Result<f64, ChainError> {
-        if self.evaluates() {
-            return Ok(rmse_of(self.measurement, material, &self.options, &self.scales)?);
-        }
-        let model =
-            material.model().parse().map_err(|e: crate::brdf::SpecError| ChainError::Mismatch(e.to_string()))?;
-        let options = FitOptions { limits: held(material), model, ..self.options.clone() };
-        let record = fit(self.measurement, &options)?.material.fit;
-        Ok(record.map_or(f64::NAN, |record| record.rmse))
+        Ok(rmse_of(self.measurement, material, &self.options, &self.scales)?)
     }
 
     /// What the references are.
@@ -133,30 +117,6 @@ fn least_scales(whole: &[Whole]) -> Vec<f64> {
     let scales = whole.iter().filter_map(|w| Some(&w.material.fit.as_ref()?.robust_scale));
     let least = scales.min_by(|a, b| a.iter().sum::<f64>().total_cmp(&b.iter().sum()));
     least.cloned().unwrap_or_default()
-}
-
-/// Every parameter held where the material has it.
-fn held(material: &Material) -> Vec<Limit> {
-    let mut limits = Vec::new();
-    for (l, lobe) in material.lobes.iter().enumerate() {
-        let occurrence = material.lobes[..l].iter().filter(|other| other.kind == lobe.kind).count();
-        let mut hold = |field, value: f64| {
-            limits.push(Limit {
-                parameter: ParameterName { kind: lobe.kind, occurrence, field },
-                low: value,
-                high: value,
-            });
-        };
-        for (channel, weight) in material.channels.iter().zip(&lobe.weight) {
-            hold(Field::Weight(Some(channel.clone())), *weight);
-        }
-        // A lobe without weight has no shape: any will do.
-        let shape = lobe.shape_of(0).unwrap_or_else(|| vec![1.0; lobe.kind.lobe().parameters().len()]);
-        for (known, value) in lobe.kind.lobe().parameters().iter().zip(shape) {
-            hold(Field::Shape(known.name.to_owned()), value);
-        }
-    }
-    limits
 }
 
 /// The ball of this material; none in the flat world, or where channels are not to be shown.
