@@ -109,7 +109,8 @@ impl Progress for Listener {
     fn finish(&self) {}
 }
 
-/// What is told falls as samples come in, and the last is what the picture states of itself, to half a unit of the last digit.
+/// The last that is told is what the picture states of itself, to half a unit of the last digit; where what is told falls as samples come in is for those who
+/// know how many there were.
 fn told_well(film: &Film, told: &[(f64, f64)]) {
     let stated = 100.0 * film.to_image().metadata.relative_error.expect("samples enough")[0];
     println!("told {told:?}, stated {stated} %");

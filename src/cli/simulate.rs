@@ -13,7 +13,7 @@ use super::output::{
 };
 use super::simulation::{Plan, What, finish};
 use super::ui::{Ui, significant};
-use crate::chain;
+use crate::chain::{self, Source};
 use crate::control::counted;
 use crate::gonio::{self, Affordable, Job, Raw, Scan, Spared};
 use crate::measurement::{Format, Measurement, formats};
@@ -47,17 +47,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
-    let format = output_format(&args.out, None)?;
-    check_folder(&args.out)?;
-    if let Some(raw) = &args.raw {
-        check_folder(raw)?;
-        distinct_outputs(("--out", &args.out), ("--raw", raw))?;
-        let inputs = [args.what.spec.as_deref(), args.what.instrument.as_deref().map(Path::new)];
-        keeps_inputs("--raw", raw, inputs.into_iter().flatten())?;
-        stdout_is_free(raw, ui)?;
-    }
-    keeps_inputs("--out", &args.out, args.what.instrument.as_deref().map(Path::new))?;
-    stdout_is_free(&args.out, ui)?;
+    let format = check_outputs(args, ui)?;
     let plan = Plan::new(&args.what, Some(&args.out))?;
     let (source, name) = plan.load()?;
     formats::check_channels(source.channels(), format, &args.out)?;
@@ -72,22 +62,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         let (budget_s, seconds) = (args.budget_s(), ui.start().elapsed().as_secs_f64());
         (table, None, How { budget_s, seconds, ..How::default() })
     } else {
-        let (raw, how) =
-            chain::with_job(&name, &source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
-                read(job, args, ui)
-            })?;
-        if let Some(note) = raw.notes.first().filter(|_| raw.readings.iter().all(|r| r.entry.is_none())) {
-            return Err(Failure::stopped(format!("{note}: nothing is written")));
-        }
-        if let Some(path) = &args.raw {
-            write_text(path, &raw.to_csv(&plan.instrument))?;
-        }
-        // So that `reduce` of the raw file gives the same bytes.
-        let raw = raw.as_written();
-        let mut table = chain::reduced_until(&name, &raw, &plan.instrument, ui.control().stop)?.measurement;
-        if args.raw.is_none() {
-            table.origin = format!("simulated, scan {}, seed {}", plan.scan, plan.seed);
-        }
+        let (table, raw, how) = with_raw(args, &plan, (&source, &name), ui)?;
         (table, Some(raw), how)
     };
     table.notes.extend(below_horizon(&plan.scan, &table));
@@ -95,22 +70,65 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         ui.warn(note);
     }
     how.warn(ui);
-    if let Scan::Adaptive { pairs } = plan.scan
-        && table.len() < pairs as usize
-        && !ui.control().stop.requested()
-    {
-        let step = significant(gonio::least_step_deg(&plan.instrument));
-        let found = table.len();
-        ui.warn(&format!(
-            "scan {}: ended with {found} pairs, no gap between readings is wider than two steps of {step}°",
-            plan.scan
-        ));
+    for said in ended_early(&plan, &table).filter(|_| !ui.control().stop.requested()) {
+        ui.warn(&said);
     }
     write_measurement(&table, &args.out, format, ui)?;
     let how = How { in_all_s: ui.start().elapsed().as_secs_f64(), ..how };
     let result = report(args, &plan, &table, raw.as_ref(), &how);
     let outputs = [Some(args.out.as_path()), args.raw.as_deref()];
     finish(&table, raw.as_ref(), &plan.instrument, result, &outputs, ui)
+}
+
+/// Refuses outputs that can't be written, or would write over something; the format of the measurement.
+fn check_outputs(args: &Args, ui: &Ui) -> Result<Format, Failure> {
+    let format = output_format(&args.out, None)?;
+    check_folder(&args.out)?;
+    if let Some(raw) = &args.raw {
+        check_folder(raw)?;
+        distinct_outputs(("--out", &args.out), ("--raw", raw))?;
+        let inputs = [args.what.spec.as_deref(), args.what.instrument.as_deref().map(Path::new)];
+        keeps_inputs("--raw", raw, inputs.into_iter().flatten())?;
+        stdout_is_free(raw, ui)?;
+    }
+    keeps_inputs("--out", &args.out, args.what.instrument.as_deref().map(Path::new))?;
+    stdout_is_free(&args.out, ui)?;
+    Ok(format)
+}
+
+/// Takes raw readings, writes them where they are asked for, and reduces them.
+fn with_raw(
+    args: &Args,
+    plan: &Plan,
+    (source, name): (&Source, &str),
+    ui: &Ui,
+) -> Result<(Measurement, Raw, How), Failure> {
+    let (raw, how) =
+        chain::with_job(name, source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| read(job, args, ui))?;
+    if let Some(note) = raw.notes.first().filter(|_| raw.readings.iter().all(|r| r.entry.is_none())) {
+        return Err(Failure::stopped(format!("{note}: nothing is written")));
+    }
+    if let Some(path) = &args.raw {
+        write_text(path, &raw.to_csv(&plan.instrument))?;
+    }
+    // So that `reduce` of the raw file gives the same bytes.
+    let raw = raw.as_written();
+    let mut table = chain::reduced_until(name, &raw, &plan.instrument, ui.control().stop)?.measurement;
+    if args.raw.is_none() {
+        table.origin = format!("simulated, scan {}, seed {}", plan.scan, plan.seed);
+    }
+    Ok((table, raw, how))
+}
+
+/// Says where an adaptive scan found no place for all of its pairs.
+fn ended_early(plan: &Plan, table: &Measurement) -> impl Iterator<Item = String> {
+    let is_short = matches!(plan.scan, Scan::Adaptive { pairs } if table.len() < pairs as usize);
+    let said = || {
+        let (scan, found) = (&plan.scan, table.len());
+        let step = significant(gonio::least_step_deg(&plan.instrument));
+        format!("scan {scan}: ended with {found} pairs, no gap between readings is wider than two steps of {step}°")
+    };
+    is_short.then(said).into_iter()
 }
 
 /// Says how many directions of a list can't be measured.
@@ -122,8 +140,9 @@ fn below_horizon(scan: &Scan, table: &Measurement) -> Option<String> {
         .then(|| format!("{pairs} of directions {are} masked: at or below the horizon"))
 }
 
-/// Why neither accuracy nor time for it change anything.
+/// Why neither accuracy nor time for it change anything: by the instrument, or by what `--auto` left out.
 const NO_MEANS: &str = "all was read, for this instrument reads without means over cones or spot";
+const MEANS_LEFT_OUT: &str = "all was read, for --auto left out the means over cones and spot";
 
 /// How readings were made.
 #[derive(Default)]
@@ -143,6 +162,8 @@ struct How {
     in_all_s: f64,
     /// Effects whose means the accuracy is of.
     means: Vec<&'static str>,
+    /// Whether there were some, and all were left out.
+    means_left_out: bool,
 }
 
 /// Where readings end later than the budget by more than this share of it and more than these seconds, it is said.
@@ -158,8 +179,9 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
     });
     let left_out: Vec<&str> = spared.iter().map(|s| s.effect).collect();
     let job = Job { left_out: &left_out, ..job };
-    let means = gonio::means(job.instrument, job.channels);
-    let means: Vec<&str> = means.into_iter().filter(|name| !left_out.contains(name)).collect();
+    let all = gonio::means(job.instrument, job.channels);
+    let means: Vec<&str> = all.iter().copied().filter(|name| !left_out.contains(name)).collect();
+    let means_left_out = means.is_empty() && !all.is_empty();
     let left = args.time_budget.map(|time| time.saturating_sub(ui.start().elapsed()));
     // Without means there is nothing to choose.
     let affordable = left.filter(|_| !means.is_empty()).map(|left| job.affordable(left, ui.control().stop));
@@ -179,6 +201,7 @@ fn read(job: &Job<'_>, args: &Args, ui: &Ui) -> (Raw, How) {
             seconds,
             in_all_s: seconds,
             means,
+            means_left_out,
         },
     )
 }
@@ -193,10 +216,11 @@ impl Args {
 impl How {
     /// What came of the accuracy that was asked for, or of the time for it; nothing where there is nothing to say.
     fn said(&self, args: &Args) -> String {
+        let why = if self.means_left_out { MEANS_LEFT_OUT } else { NO_MEANS };
         let mut text = match (args.time_budget, args.target_error) {
             (None, None) if self.error == 0.0 => return String::new(),
-            (Some(_), _) if self.means.is_empty() => format!("; --time-budget changed nothing: {NO_MEANS}"),
-            (_, Some(_)) if self.means.is_empty() => format!("; --target-error changed nothing: {NO_MEANS}"),
+            (Some(_), _) if self.means.is_empty() => format!("; --time-budget changed nothing: {why}"),
+            (_, Some(_)) if self.means.is_empty() => format!("; --target-error changed nothing: {why}"),
             _ => format!("; means over cones to {:.1e}", self.error),
         };
         if let Some(budget_s) = self.budget_s {

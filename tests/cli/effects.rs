@@ -108,6 +108,12 @@ fn what_a_tolerance_leaves_out_is_named_and_below_it_nothing_changes() {
     let off = said["effects"].as_array().expect("a list").iter().find(|e| e["name"] == "sample tilt").expect("it");
     assert!(off["on"] == false && off["why"].as_str().expect("text").contains("at most"), "{off}");
     let none = b.json(&["simulate", "lab.toml", "--auto", "1e-12", "--out", "same.csv"]);
+    // Where the means themselves are left out, that is the reason that nothing depends on a time for them.
+    let loose = ["simulate", "lab.toml", "--auto", "0.9", "--time-budget", "1h", "--out", "loose.csv"];
+    let governs = b.json(&loose)["time_budget"]["governs"].as_array().map(Vec::len);
+    assert_eq!(governs, Some(0));
+    let text = b.ok(&loose).text();
+    assert!(text.contains("--time-budget changed nothing") && text.contains("--auto left out the means"), "{text}");
     // A well that nothing fills changes no bit.
     assert_eq!(none["left_out"].as_array().map(Vec::len), Some(1));
     assert_eq!(b.bytes("same.csv"), b.bytes("all.csv"));

@@ -88,7 +88,7 @@ fn simulated(run: &Run) -> Option<Result<Listed, String>> {
         words.extend(["--instrument", name]);
     }
     let known = if own { Some(Instrument::default()) } else { known_instrument(name, &run.folders()) };
-    Some(listed(run, known.as_ref(), (name, format!("The instrument, {name}")), &truth.channels, &words))
+    Some(listed(run, known.as_ref(), (name, &run.title, format!("The instrument, {name}")), &truth.channels, &words))
 }
 
 /// Of the instrument that a fit was made through, where it is what it was then.
@@ -96,7 +96,7 @@ fn seen_through(run: &Run, fit: &RunFit, name: &str) -> Result<Listed, String> {
     let words = ["goniofit", "effects", "--material", &fit.file, "--instrument", name];
     let known = fit.through.as_ref().and_then(|_| known_instrument(name, &fit_folders(run, fit)));
     let title = format!("The instrument, {name}, through which {} is a fit", fit.label);
-    listed(run, known.as_ref(), (name, title), &fit.material().channels, &words)
+    listed(run, known.as_ref(), (name, &fit.file, title), &fit.material().channels, &words)
 }
 
 /// Where a fit's instrument may lie: as the run's files, and beside the fit.
@@ -108,7 +108,7 @@ fn fit_folders<'a>(run: &'a Run, fit: &'a RunFit) -> Vec<&'a Path> {
 fn listed(
     run: &Run,
     known: Option<&Instrument>,
-    (name, title): (&str, String),
+    (name, material, title): (&str, &str, String),
     channels: &[String],
     words: &[&str],
 ) -> Result<Listed, String> {
@@ -118,12 +118,24 @@ fn listed(
             "What the instrument {name} simulates is not known here: it is neither built in, nor can its file be read where the run was made. Where it is: {command}"
         ));
     };
-    let measured = run.effects.as_ref().filter(|e| e["instrument"] == name);
+    // What effects are worth depends on the material as much as on the instrument.
+    let is_of = |e: &&Value| e["instrument"] == name && e["material"].as_str().is_some_and(|m| is_same(m, material));
+    let measured = run.effects.as_ref().filter(is_of);
+    let title = measured.map_or(title.clone(), |found| {
+        let [material, scan] = ["material", "scan"].map(|key| found[key].as_str().unwrap_or("not said"));
+        format!("{title}; figures are of {material}, scan {scan}")
+    });
     let effects = match measured.and_then(|found| found["effects"].as_array()) {
         Some(found) => found.iter().map(told).collect(),
         None => plain(gonio::plan(known, channels)),
     };
     Ok(Listed::new(title, effects, measured.is_some(), command))
+}
+
+/// Whether two names of a material are of one: the same words, or the same file.
+fn is_same(a: &str, b: &str) -> bool {
+    let file = |name: &str| std::fs::canonicalize(name).ok();
+    a == b || file(a).is_some_and(|own| file(b) == Some(own))
 }
 
 /// Of the scene, with what `effects.json` says of it.
@@ -248,15 +260,18 @@ mod tests {
             "{}",
             list.command
         );
-        // With what each is worth, where that was measured of this instrument, and not of another.
-        let mut measured = |instrument: &str| {
+        // With what each is worth, where that was measured of this instrument and this fit, and not of others.
+        let own = run.fits[0].file.clone();
+        let mut measured = |instrument: &str, material: &str| {
             let aperture = json!({"effect": "detector aperture", "on": true, "why": "4", "share": 0.5, "reading": {"largest": 0.5, "rms": 0.25}});
-            run.effects = Some(json!({"instrument": instrument, "effects": [aperture]}));
+            run.effects = Some(json!({"instrument": instrument, "material": material, "scan": "merl", "effects": [aperture]}));
             let list = effects(&run).lists.swap_remove(0);
+            assert_eq!(list.title.ends_with(&format!("figures are of {material}, scan merl")), list.measured);
             (list.measured, list.on[0].off_by.clone(), list.on.len())
         };
-        assert_eq!(measured("wide.toml"), (true, percent(0.25), 1));
-        assert_eq!(measured("other.toml"), (false, String::new(), 3));
+        assert_eq!(measured("wide.toml", &own), (true, percent(0.25), 1));
+        assert_eq!(measured("other.toml", &own), (false, String::new(), 3));
+        assert_eq!(measured("wide.toml", "satin"), (false, String::new(), 3));
         // Of a plain fit there is nothing to list.
         let mut plain = fitted_through_wide(folder.path(), true);
         let material = Material { fit: None, ..plain.fits[0].material().clone() };
