@@ -70,17 +70,23 @@ fn a_target_out_of_reach_ends_at_the_most_samples() {
     assert!(film.error().expect("samples enough").at_most > 1e-6);
 }
 
-/// Notes what is told, once for a number of samples, with that, and asks to stop where it has grown by a factor since the first.
+/// Samples a pixel from which what is told is noted: with so many an error is known well, however slow the machine and early the first look.
+const KNOWN: u64 = 256;
+
+/// Notes what is told from so many samples on, once for a number of samples, with that, and asks to stop where it has grown by a factor since the first.
 struct Listener {
     samples: AtomicU64,
     told: Mutex<Vec<(u64, String)>>,
+    from: u64,
     growth: u64,
     stop: Stop,
 }
 
 impl Listener {
-    fn new(growth: u64) -> Self {
-        Self { samples: AtomicU64::new(0), told: Mutex::default(), growth, stop: Stop::new() }
+    /// Of a picture of that side.
+    fn new(side: u64, growth: u64) -> Self {
+        let from = KNOWN * side * side;
+        Self { samples: AtomicU64::new(0), told: Mutex::default(), from, growth, stop: Stop::new() }
     }
 
     /// The errors told, in per cent as they are printed, with the samples of all tiles by then.
@@ -99,7 +105,8 @@ impl Progress for Listener {
     fn tell(&self, state: &str) {
         let samples = self.samples.load(Ordering::Relaxed);
         let mut told = self.told.lock().expect("no thread failed");
-        if !state.is_empty() && told.last().is_none_or(|(last, _)| *last < samples) {
+        let is_known = samples >= self.from && !state.is_empty();
+        if is_known && told.last().is_none_or(|(last, _)| *last < samples) {
             told.push((samples, state.to_owned()));
         }
         if told.first().is_some_and(|(first, _)| samples / self.growth >= *first) {
@@ -109,8 +116,7 @@ impl Progress for Listener {
     fn finish(&self) {}
 }
 
-/// The last that is told is what the picture states of itself, to half a unit of the last digit; where what is told falls as samples come in is for those who
-/// know how many there were.
+/// What is told falls as samples come in, and the last is what the picture states of itself, to half a unit of the last digit.
 fn told_well(film: &Film, told: &[(f64, f64)]) {
     let stated = 100.0 * film.to_image().metadata.relative_error.expect("samples enough")[0];
     println!("told {told:?}, stated {stated} %");
@@ -124,8 +130,9 @@ fn told_well(film: &Film, told: &[(f64, f64)]) {
 
 #[test]
 fn the_error_is_told_at_each_look_at_a_target() {
-    let listener = Listener::new(u64::MAX);
-    let options = Options { width: 32, height: 32, samples: 1 << 16, target_error: Some(0.02), ..Options::default() };
+    let listener = Listener::new(32, u64::MAX);
+    // Some 4,000 samples a pixel, so that there are several looks at what is known well.
+    let options = Options { width: 32, height: 32, samples: 1 << 16, target_error: Some(0.005), ..Options::default() };
     let control = Control { progress: &listener, stop: &listener.stop };
     let film = render(&built("cornell"), &options, control).expect("options are in range");
     assert!(!listener.stop.requested());
@@ -135,7 +142,7 @@ fn the_error_is_told_at_each_look_at_a_target() {
 /// A number of samples asks for no look: the error is told once a second, to whoever listens.
 #[test]
 fn the_error_is_told_while_a_number_of_samples_is_taken() {
-    let listener = Listener::new(4);
+    let listener = Listener::new(64, 4);
     let options = Options { width: 64, height: 64, samples: 1 << 20, ..Options::default() };
     let control = Control { progress: &listener, stop: &listener.stop };
     let start = Instant::now();

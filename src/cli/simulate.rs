@@ -103,8 +103,9 @@ fn with_raw(
     (source, name): (&Source, &str),
     ui: &Ui,
 ) -> Result<(Measurement, Raw, How), Failure> {
-    let (raw, how) =
-        chain::with_job(name, source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| read(job, args, ui))?;
+    let (raw, how) = chain::with_job(name, source, &plan.instrument, &plan.scan, plan.seed, ui.control(), |job| {
+        read(job, args, ui)
+    })?;
     if let Some(note) = raw.notes.first().filter(|_| raw.readings.iter().all(|r| r.entry.is_none())) {
         return Err(Failure::stopped(format!("{note}: nothing is written")));
     }

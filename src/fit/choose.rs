@@ -400,7 +400,14 @@ mod tests {
         let model = model.into();
         let (aicc, bic) = (0.0, 0.0);
         let candidate = ModelCandidate { model, parameters, rmse: held_out_rmse, held_out_rmse, aicc, bic };
-        Tried { candidate, effective: None, rounding: 1e-13, folds: vec![held_out_rmse; FOLDS], part: None, is_cut: false }
+        Tried {
+            candidate,
+            effective: None,
+            rounding: 1e-13,
+            folds: vec![held_out_rmse; FOLDS],
+            part: None,
+            is_cut: false,
+        }
     }
 
     #[test]

@@ -332,28 +332,9 @@ fn finish(
     let samples = problem.samples;
     let residuals = samples.residuals();
     let rmse = (solution.cost / residuals.max(1) as f64).sqrt();
-    let (sum, known) = uncertainty.stated;
-    // Of outliers a stated σ says nothing: a robust fit's noise is told by neighbours.
-    let says = known == residuals && known > 0 && problem.saturation.is_none();
-    // Shared errors may show in residuals or be taken up by the fit: as much of them counts as noise as there is.
-    let [own, most] = [sum, sum + uncertainty.common_noise].map(|sum| (sum / residuals as f64).sqrt());
-    let stated = says.then(|| rmse.clamp(own, most));
-    let independent = residuals as f64 / uncertainty.design_effect;
-    let structure = structure::structure(rmse, stated, &uncertainty.neighbours, residuals, independent);
-    let structure = structure.filter(|_| rmse > ROUNDING);
+    let structure = told_structure(problem, &uncertainty, rmse);
     let capped = solution.weights.iter().enumerate().map(|(c, x)| problem.is_capped(c, x)).collect();
-    let weights = solution.weights.len() * problem.kinds.len();
-    let at_end: Vec<bool> = (weights..uncertainty.errors.len())
-        .map(|i| intervals::is_at_end(problem, &solution, &uncertainty, i))
-        .collect();
-    for (i, (low, high)) in problem.bounds.iter().enumerate().filter(|(_, (low, high))| low < high) {
-        // An interval over all that is searched is no answer.
-        if intervals[weights + i].is_some_and(|(a, b)| a <= *low && b >= *high) {
-            (uncertainty.errors[weights + i], intervals[weights + i]) = (None, None);
-        }
-    }
-    let errors = uncertainty.errors[weights..].iter_mut();
-    errors.zip(&at_end).filter(|(_, ends)| **ends).for_each(|(error, _)| *error = None);
+    let at_end = without_ends(problem, &solution, &mut uncertainty, &mut intervals);
     Ok(Part {
         channels: samples.channels.clone(),
         scale: samples.scale,
@@ -380,4 +361,39 @@ fn finish(
         bootstrap: None,
         lacks_profiles: false,
     })
+}
+
+/// What the residuals say of noise and of the model's error.
+fn told_structure(problem: &Problem<'_>, uncertainty: &Uncertainty, rmse: f64) -> Option<Structure> {
+    let residuals = problem.samples.residuals();
+    let (sum, known) = uncertainty.stated;
+    // Of outliers a stated σ says nothing: a robust fit's noise is told by neighbours.
+    let says = known == residuals && known > 0 && problem.saturation.is_none();
+    // Shared errors may show in residuals or be taken up by the fit: as much of them counts as noise as there is.
+    let [own, most] = [sum, sum + uncertainty.common_noise].map(|sum| (sum / residuals as f64).sqrt());
+    let stated = says.then(|| rmse.clamp(own, most));
+    let independent = residuals as f64 / uncertainty.design_effect;
+    let structure = structure::structure(rmse, stated, &uncertainty.neighbours, residuals, independent);
+    structure.filter(|_| rmse > ROUNDING)
+}
+
+/// Takes errors and intervals from shapes that have none: those at an end of their range, which are returned, and those whose interval is all that is searched.
+fn without_ends(
+    problem: &Problem<'_>,
+    solution: &Solution,
+    uncertainty: &mut Uncertainty,
+    intervals: &mut Intervals,
+) -> Vec<bool> {
+    let weights = solution.weights.len() * problem.kinds.len();
+    let at_end: Vec<bool> =
+        (weights..uncertainty.errors.len()).map(|i| intervals::is_at_end(problem, solution, uncertainty, i)).collect();
+    for (i, (low, high)) in problem.bounds.iter().enumerate().filter(|(_, (low, high))| low < high) {
+        // An interval over all that is searched is no answer.
+        if intervals[weights + i].is_some_and(|(a, b)| a <= *low && b >= *high) {
+            (uncertainty.errors[weights + i], intervals[weights + i]) = (None, None);
+        }
+    }
+    let errors = uncertainty.errors[weights..].iter_mut();
+    errors.zip(&at_end).filter(|(_, ends)| **ends).for_each(|(error, _)| *error = None);
+    at_end
 }

@@ -109,7 +109,21 @@ fn what_a_tolerance_leaves_out_is_named_and_below_it_nothing_changes() {
     assert!(off["on"] == false && off["why"].as_str().expect("text").contains("at most"), "{off}");
     let none = b.json(&["simulate", "lab.toml", "--auto", "1e-12", "--out", "same.csv"]);
     // Where the means themselves are left out, that is the reason that nothing depends on a time for them.
-    let loose = ["simulate", "lab.toml", "--auto", "0.9", "--time-budget", "1h", "--out", "loose.csv"];
+    b.write("cone.toml", "version = 1\n[instrument.detector]\naperture_deg = 0.01\n");
+    let loose = [
+        "simulate",
+        "cone.toml",
+        "--material",
+        "satin",
+        "--scan",
+        "in-plane:15",
+        "--auto",
+        "1e-2",
+        "--time-budget",
+        "1h",
+        "--out",
+        "loose.csv",
+    ];
     let governs = b.json(&loose)["time_budget"]["governs"].as_array().map(Vec::len);
     assert_eq!(governs, Some(0));
     let text = b.ok(&loose).text();

@@ -56,6 +56,14 @@ fn deviations(runs: &[Vec<f64>]) -> Vec<f64> {
         .collect()
 }
 
+/// Kurtosis of one reading, 3 of a normal one.
+fn kurtosis(runs: &[Vec<f64>], i: usize) -> f64 {
+    let count = runs.len() as f64;
+    let mean = runs.iter().map(|r| r[i]).sum::<f64>() / count;
+    let moment = |power: i32| runs.iter().map(|r| (r[i] - mean).powi(power)).sum::<f64>() / count;
+    moment(4) / moment(2).powi(2)
+}
+
 /// Standard deviation of every reading over draws of one error.
 fn scatter(of: &Experiment, draw: impl Fn(&[Reading], u64) -> Actual + Sync, left_out: &[&str]) -> Vec<f64> {
     deviations(&values(of, draw, left_out, DRAWS))
@@ -150,8 +158,8 @@ fn errors_of_exposure_times_are_what_monte_carlo_finds() {
 /// All errors drawn at once (GUM Supplement 1): the standard deviation of each reading is its combined standard uncertainty, and the central 95 % of the
 /// draws end at ±1.96 of it. `GONIOFIT_DRAWS=100000` takes as many.
 ///
-/// Of N normal draws a standard deviation scatters by 1/√(2N), a quantile by √(p(1 − p)/N) over its density; that one of all that are compared is farther
-/// off than allowed has a probability of 1 %. To this comes what a line may be off.
+/// Of N draws of kurtosis κ a standard deviation scatters by √((κ − 1)/(4N)), which is 1/√(2N) of normal ones, a quantile by √(p(1 − p)/N) over its density,
+/// here a normal one's; that one of all that are compared is farther off than allowed has a probability of 1 %. To this comes what a line may be off.
 fn check_joint(name: &str) {
     let of = Experiment::new(name, CLASSES[1].1);
     let draws = std::env::var("GONIOFIT_DRAWS").map_or(DRAWS, |count| count.parse().expect("a count"));
@@ -163,12 +171,13 @@ fn check_joint(name: &str) {
     let (k, count) = (normal_quantile(0.975), draws as f64);
     let z = normal_quantile(1.0 - 0.5 * sidak(0.01, 3 * valid.len()));
     let density = (-0.5 * k * k).exp() / std::f64::consts::TAU.sqrt();
-    let of_sigma = OFF + z / (2.0 * count).sqrt();
+    let of_sigma = |kurtosis: f64| OFF + z * ((kurtosis - 1.0) / (4.0 * count)).sqrt();
     let of_end = OFF + z * (0.025 * 0.975 / count).sqrt() / density / k;
     let deviations = deviations(&runs);
     let mut ratios = Vec::new();
     for i in valid {
         let (truth, stated) = (of.expected(i), sigma(&m, i));
+        let of_sigma = of_sigma(kurtosis(&runs, i));
         let mut errors: Vec<f64> = runs.iter().map(|r| r[i] - truth).collect();
         errors.sort_by(f64::total_cmp);
         let end = |p: f64| errors[(p * count) as usize] / (k * stated);

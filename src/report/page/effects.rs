@@ -264,7 +264,8 @@ mod tests {
         let own = run.fits[0].file.clone();
         let mut measured = |instrument: &str, material: &str| {
             let aperture = json!({"effect": "detector aperture", "on": true, "why": "4", "share": 0.5, "reading": {"largest": 0.5, "rms": 0.25}});
-            run.effects = Some(json!({"instrument": instrument, "material": material, "scan": "merl", "effects": [aperture]}));
+            run.effects =
+                Some(json!({"instrument": instrument, "material": material, "scan": "merl", "effects": [aperture]}));
             let list = effects(&run).lists.swap_remove(0);
             assert_eq!(list.title.ends_with(&format!("figures are of {material}, scan merl")), list.measured);
             (list.measured, list.on[0].off_by.clone(), list.on.len())

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::curve::{About, Beside, Sweep, curves, words};
-use super::design::{Cost, Measure, Series, Setting};
+use super::design::{Cost, Law, Measure, Series, Setting};
 use super::knob::Knob;
 use super::sweep::{Effort, Trial, run};
 use crate::brdf::{Material, ModelSpec};
@@ -103,66 +103,79 @@ fn design(
     models: &[ModelSpec],
     yardstick: &Yardstick<'_>,
 ) -> (Vec<Series>, Vec<Setting<Way>>) {
-    let (mut series, mut settings) = (Vec::new(), Vec::new());
     let whole = measurement.len() as f64;
+    let mut all = Designed { what, whole, series: Vec::new(), settings: Vec::new() };
     let own_loss = what.options.loss;
     let losses = if what.losses.is_empty() { vec![own_loss] } else { what.losses.clone() };
     for (m, model) in models.iter().enumerate() {
         for &loss in &losses {
             let (is_own, is_best) = (loss == own_loss, yardstick.is_best(m));
-            let laws = |knob: Knob| yardstick.residuals(m).laws(knob, is_own, is_best);
             let options = FitOptions { model: model.clone(), loss, ..what.options.clone() };
-            let name = named(model, loss, losses.len() > 1);
+            let of = Fitted { model: m, name: named(model, loss, losses.len() > 1), options };
             for (knob, steps) in [(Knob::Part, &what.parts), (Knob::Stride, &what.strides)] {
-                if steps.is_empty() {
-                    continue;
-                }
-                let name = if knob == Knob::Part { name.clone() } else { format!("{name}, every N-th entry") };
-                series.push(Series {
-                    name,
-                    knob,
-                    cost: Cost::Computer,
-                    main: 0,
-                    laws: laws(knob),
-                    whole,
-                    advisable: true,
-                });
-                for &step in steps {
-                    let size = (whole / step as f64).max(1.0);
-                    let (part, stride) = if knob == Knob::Part { (step, 1) } else { (1, step) };
-                    let way = Way { options: FitOptions { stride, part, ..options.clone() }, model: m };
-                    let text = typed(model, loss, what, &knob.typed(size, whole));
-                    let effective = if step < FEW { f64::INFINITY } else { 1.0 / (1.0 / size - 1.0 / whole) };
-                    let setting = Setting::sized(series.len() - 1, size, text, way);
-                    settings.push(Setting { effective: Some(effective), ..setting });
-                }
+                all.of_parts(&of, knob, steps, yardstick.residuals(m).laws(knob, is_own, is_best));
             }
-            if what.targets.is_empty() {
-                continue;
-            }
-            let name = format!("{name}, as many as a target takes");
-            let laws = vec![None; 3];
-            series.push(Series {
-                name,
-                knob: Knob::ExcessTarget,
-                cost: Cost::Computer,
-                main: 0,
-                laws,
-                whole,
-                advisable: true,
-            });
-            for &target in &what.targets {
-                let way = Way {
-                    options: FitOptions { target_rmse_excess: Some(target), stride: 1, ..options.clone() },
-                    model: m,
-                };
-                let text = typed(model, loss, what, &Knob::ExcessTarget.typed(target, 0.0));
-                let setting = Setting::sized(series.len() - 1, target, text, way);
-                settings.push(Setting { promise: Some(target).filter(|_| is_own && is_best), ..setting });
-            }
+            all.of_targets(&of, is_own && is_best);
         }
     }
-    (series, settings)
+    (all.series, all.settings)
+}
+
+/// A model with a loss.
+struct Fitted {
+    /// Which model, an index.
+    model: usize,
+    name: String,
+    options: FitOptions,
+}
+
+struct Designed<'a> {
+    what: &'a FitSweep,
+    /// Entries of the table.
+    whole: f64,
+    series: Vec<Series>,
+    settings: Vec<Setting<Way>>,
+}
+
+impl Designed<'_> {
+    fn begin(&mut self, name: String, knob: Knob, laws: Vec<Option<Law>>) {
+        let (cost, whole) = (Cost::Computer, self.whole);
+        self.series.push(Series { name, knob, cost, main: 0, laws, whole, advisable: true });
+    }
+
+    /// Parts of the table, one of every so many entries.
+    fn of_parts(&mut self, of: &Fitted, knob: Knob, steps: &[usize], laws: Vec<Option<Law>>) {
+        if steps.is_empty() {
+            return;
+        }
+        let Fitted { model, name, options } = of;
+        self.begin(if knob == Knob::Part { name.clone() } else { format!("{name}, every N-th entry") }, knob, laws);
+        for &step in steps {
+            let size = (self.whole / step as f64).max(1.0);
+            let (part, stride) = if knob == Knob::Part { (step, 1) } else { (1, step) };
+            let way = Way { options: FitOptions { stride, part, ..options.clone() }, model: *model };
+            let text = typed(&options.model, options.loss, self.what, &knob.typed(size, self.whole));
+            let effective = if step < FEW { f64::INFINITY } else { 1.0 / (1.0 / size - 1.0 / self.whole) };
+            let setting = Setting::sized(self.series.len() - 1, size, text, way);
+            self.settings.push(Setting { effective: Some(effective), ..setting });
+        }
+    }
+
+    /// As many samples as a target takes; the best model by the yardstick's own loss promises it.
+    fn of_targets(&mut self, of: &Fitted, promises: bool) {
+        if self.what.targets.is_empty() {
+            return;
+        }
+        let Fitted { model, name, options } = of;
+        self.begin(format!("{name}, as many as a target takes"), Knob::ExcessTarget, vec![None; 3]);
+        for &target in &self.what.targets {
+            let target_rmse_excess = Some(target);
+            let way = Way { options: FitOptions { target_rmse_excess, stride: 1, ..options.clone() }, model: *model };
+            let text = typed(&options.model, options.loss, self.what, &Knob::ExcessTarget.typed(target, 0.0));
+            let setting = Setting::sized(self.series.len() - 1, target, text, way);
+            self.settings.push(Setting { promise: Some(target).filter(|_| promises), ..setting });
+        }
+    }
 }
 
 fn named(model: &ModelSpec, loss: Loss, with_loss: bool) -> String {
