@@ -127,9 +127,10 @@ fn compare(
     loop {
         let began = Instant::now();
         let all = entries >= SAMPLES.min(measurement.len());
-        let (order, late): (&[usize], Option<&dyn Fn(Duration) -> bool>) =
-            if entries == FIRST { (&IN_HASTE, Some(&late)) } else { (&richest_first, None) };
-        match compare_on((entries, order), models, measurement, options, &Haste { late, deadline }) {
+        let first = entries == FIRST;
+        let order: &[usize] = if first { &IN_HASTE } else { &richest_first };
+        let haste = Haste { late: if first { Some(&late) } else { None }, deadline };
+        match compare_on((entries, order), models, measurement, options, &haste) {
             Err(FitError::NothingToFit { .. }) if !all => {} // what counts may be among the others
             Ok(tried) => {
                 let cut = tried.len() < models.len();
