@@ -44,3 +44,20 @@ impl Raw {
         &self.signal[i * width..(i + 1) * width]
     }
 }
+
+#[cfg(test)]
+impl Raw {
+    /// One channel, and no reading.
+    pub(in crate::gonio) fn nothing_read() -> Self {
+        Self {
+            channels: vec!["y".into()],
+            dimension: Dimension::Space,
+            directions: Directions::List { wi: vec![], wo: vec![] },
+            weights: Weights::Uniform,
+            readings: vec![],
+            signal: vec![],
+            quadrature_error: 0.0,
+            notes: vec![],
+        }
+    }
+}

@@ -131,8 +131,7 @@ impl Cones {
 
     /// Writes the mean of `f`, all channels, over both cones about (wi, wo), and returns by which share it may be off: the largest relative change
     /// that the last doubling brought; where it is `kinked`, as a table is that is linear between its values, a quarter of the one before if that is more, and
-    /// what the narrower cone's rule leaves.
-    /// `f` adds its values times a weight.
+    /// what the narrower cone's rule leaves. `f` adds its values times a weight.
     pub fn mean(
         &self,
         wi: DVec3,

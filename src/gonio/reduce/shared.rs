@@ -419,22 +419,8 @@ mod tests {
     use crate::gonio::raw::Raw;
     use crate::gonio::reduce::stops::Rate;
     use crate::gonio::reduce::visits::{At, ReferencePart};
-    use crate::measurement::{Dimension, Directions, Weights};
 
     const EXPOSURE_U: f64 = 0.01;
-
-    fn nothing_read() -> Raw {
-        Raw {
-            channels: vec!["y".into()],
-            dimension: Dimension::Space,
-            directions: Directions::List { wi: vec![], wo: vec![] },
-            weights: Weights::Uniform,
-            readings: vec![],
-            signal: vec![],
-            quadrature_error: 0.0,
-            notes: vec![],
-        }
-    }
 
     /// A reading of value 1, beside a reference as bright in another exposure: 1 σ of either is `EXPOSURE_U`.
     fn reduced(own_s: f64, reference_s: f64, visit: usize) -> Reduced {
@@ -460,7 +446,7 @@ mod tests {
         const READINGS: usize = 200;
         let mut instrument = Instrument::default();
         instrument.detector.exposure_u = EXPOSURE_U;
-        let visits = Visits::new(&[], &nothing_read(), &instrument).expect("nothing to refuse");
+        let visits = Visits::new(&[], &Raw::nothing_read(), &instrument).expect("nothing to refuse");
         for (is_set_anew, most) in [(false, MOST_EXPOSURES), (true, MOST_EXPOSURES + MOST_GROUPS)] {
             let mut shared = Shared::new(READINGS, 1, (&visits, 0.0), &instrument);
             // Of 20 visits four in a row are one component.
@@ -486,7 +472,7 @@ mod tests {
     fn an_exposure_shared_with_the_reference_cancels_beyond_the_most_too() {
         let mut instrument = Instrument::default();
         instrument.detector.exposure_u = EXPOSURE_U;
-        let visits = Visits::new(&[], &nothing_read(), &instrument).expect("nothing to refuse");
+        let visits = Visits::new(&[], &Raw::nothing_read(), &instrument).expect("nothing to refuse");
         let mut shared = Shared::new(30, 1, (&visits, 0.0), &instrument);
         shared.has_reference = true;
         (0..29).for_each(|i| shared.exposures(i, &reduced(1.0 + i as f64, 0.5, 0)));

@@ -322,20 +322,6 @@ impl IntoIterator for Around {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement::{Dimension, Directions, Weights};
-
-    fn raw() -> Raw {
-        Raw {
-            channels: vec!["y".into()],
-            dimension: Dimension::Space,
-            directions: Directions::List { wi: vec![], wo: vec![] },
-            weights: Weights::Uniform,
-            readings: vec![],
-            signal: vec![],
-            quadrature_error: 0.0,
-            notes: vec![],
-        }
-    }
 
     fn stop(kind: Kind, time_s: f64, mean: f64) -> Stop {
         let rate = Rate { mean, variance: 1.0, signal: mean, exposure_s: 1.0 };
@@ -351,7 +337,7 @@ mod tests {
 
     fn visits(list: &[(Kind, f64, f64)]) -> Result<Visits, ReduceError> {
         let stops: Vec<Stop> = list.iter().map(|(kind, time, mean)| stop(*kind, *time, *mean)).collect();
-        Visits::new(&stops, &raw(), &Instrument::default())
+        Visits::new(&stops, &Raw::nothing_read(), &Instrument::default())
     }
 
     /// Whichever kind was read when: constant rates give the same net rate everywhere.
