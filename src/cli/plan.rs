@@ -13,8 +13,9 @@ use super::text::{COLUMNS, wrapped};
 use super::ui::{Ui, significant};
 use crate::brdf::ModelSpec;
 use crate::fit::Limit;
-use crate::gonio::design::{self, Plan, Precision, Prior, QUANTILES, Range, Wish, precision};
+use crate::gonio::design::{self, Plan, Precision, Prior, QUANTILES, Range, Wish, precisions};
 use crate::gonio::{Instrument, Scan, lit_rows};
+use crate::measurement::Directions;
 use crate::measurement::formats::{push_number, spherical_deg};
 
 #[derive(Debug, clap::Args)]
@@ -139,17 +140,37 @@ fn brief(e: f64) -> String {
     format!("{:.digits$}", 100.0 * e)
 }
 
+/// One scan.
+struct Row {
+    name: String,
+    precision: Precision,
+    /// In [`Table::hours`], and in as many as the plan takes; less than the scan takes once mean nothing.
+    in_hours: Vec<Precision>,
+    /// Share of the best information a second.
+    efficiency: f64,
+}
+
 /// The plan beside the usual scans.
 struct Table {
     names: Vec<String>,
-    /// Name, precision, share of the best information a second.
-    scans: Vec<(String, Precision, f64)>,
+    scans: Vec<Row>,
     plan: Plan,
     /// Median errors of plans for less than the budget, [`LESS`] of it; nothing where there is none.
     shorter: [Option<Vec<f64>>; 2],
     budget_h: f64,
     /// Readings of a row as the instrument has them.
     own: u32,
+}
+
+impl Row {
+    /// Hours, efficiency and errors of these parameters, at this precision of it.
+    fn line(&self, scan: &Precision, of: &[usize]) -> String {
+        let cell = |e: &[f64; 3]| format!("{:>CELL$}", format!("{} ({})", percent(e[1]), brief(e[2])));
+        let cells: Vec<String> = of.iter().map(|&k| cell(&scan.errors[k])).collect();
+        let hours = significant(scan.hours);
+        let share = significant(100.0 * self.efficiency);
+        format!("{:13}{:>7}{hours:>8}{share:>7}{}", self.name, scan.stops, cells.join(""))
+    }
 }
 
 impl Table {
@@ -159,18 +180,19 @@ impl Table {
         (plan, shorter): (Plan, [Option<Vec<f64>>; 2]),
         budget_h: f64,
     ) -> Self {
-        let mut scans = vec![("plan".to_owned(), plan.precision.clone())];
+        let hours: Vec<f64> = Self::hours_of(budget_h).into_iter().chain([plan.precision.hours]).collect();
+        let row = |name: String, instrument: &Instrument, directions: &Directions, rows: &[u32]| {
+            let (precision, in_hours) = precisions(prior, instrument, (directions, rows), &hours);
+            let efficiency = plan.efficiency(&precision);
+            Row { name, precision, in_hours, efficiency }
+        };
+        let longer = Instrument { readings: plan.readings, ..instrument.clone() };
+        let mut scans = vec![row("plan".to_owned(), &longer, &plan.directions, &plan.rows)];
         for scan in STANDARD {
             if let Some((directions, _)) = scan.directions() {
-                let rows = lit_rows(&directions, &[]);
-                scans.push((scan.to_string(), precision(prior, instrument, &directions, &rows)));
+                scans.push(row(scan.to_string(), instrument, &directions, &lit_rows(&directions, &[])));
             }
         }
-        let scans = scans.into_iter().map(|(name, of)| {
-            let efficiency = plan.efficiency(&of);
-            (name, of, efficiency)
-        });
-        let scans = scans.collect();
         let names = prior.names().into_iter().map(str::to_owned).collect();
         Self { names, scans, plan, shorter, budget_h, own: instrument.readings }
     }
@@ -227,16 +249,20 @@ impl Table {
 
     /// Hours that precision is shown at: shares and multiples of the budget.
     fn hours(&self) -> [f64; 5] {
-        [LESS[0], LESS[1], 1.0, 2.0, 4.0].map(|times| times * self.budget_h)
+        Self::hours_of(self.budget_h)
+    }
+
+    fn hours_of(budget_h: f64) -> [f64; 5] {
+        [LESS[0], LESS[1], 1.0, 2.0, 4.0].map(|times| times * budget_h)
     }
 
     /// Median errors of scan number `i` in these hours: of plans for less than the budget their own, else of the same stops read for so long; nothing where that
     /// is less than once.
     fn against(&self, i: usize) -> [Option<Vec<f64>>; 5] {
-        let (hours, of) = (self.hours(), &self.scans[i].1);
+        let (hours, of) = (self.hours(), &self.scans[i]);
         std::array::from_fn(|k| match self.shorter.get(k) {
             Some(plan) if i == 0 => plan.clone(),
-            _ => (hours[k] >= of.hours).then(|| medians(&of.in_hours(hours[k]))),
+            _ => (hours[k] >= of.precision.hours).then(|| medians(&of.in_hours[k])),
         })
     }
 
@@ -244,7 +270,7 @@ impl Table {
     fn against_hours(&self) -> String {
         let hours = self.hours();
         let cells = |list: [String; 5]| list.map(|cell| format!("{cell:>12}")).concat();
-        let medians: Vec<_> = self.scans.iter().enumerate().map(|(i, (name, ..))| (name, self.against(i))).collect();
+        let medians: Vec<_> = self.scans.iter().enumerate().map(|(i, row)| (&row.name, self.against(i))).collect();
         let of_parameter = |(a, parameter): (usize, &String)| {
             let cell = |errors: &Option<Vec<f64>>| errors.as_ref().map_or("–".into(), |errors| percent(errors[a]));
             let line = |(name, of): &(&String, [_; 5])| format!("  {name:16}{}", cells(of.each_ref().map(cell)));
@@ -264,25 +290,16 @@ impl Table {
         let mut text = format!("{:35}{}\n", "", lobes.concat());
         // Writing to a String can't fail.
         let _ = writeln!(text, "{:13}{:>7}{:>8}{:>7}{}", "scan", "stops", "hours", "eff. %", names.concat());
-        for (name, scan, efficiency) in &self.scans {
-            let _ = writeln!(text, "{}", Self::line(name, scan, *efficiency, of));
+        for row in &self.scans {
+            let _ = writeln!(text, "{}", row.line(&row.precision, of));
         }
         let _ = writeln!(text, "as many hours as the plan:");
         // A scan that takes longer once can't be read in the plan's hours.
-        let hours = self.scans[0].1.hours;
-        for (name, scan, efficiency) in self.scans[1..].iter().filter(|(_, scan, _)| scan.hours <= hours) {
-            let _ = writeln!(text, "{}", Self::line(name, &scan.in_hours(hours), *efficiency, of));
+        let hours = self.scans[0].precision.hours;
+        for row in self.scans[1..].iter().filter(|row| row.precision.hours <= hours) {
+            text.extend(row.in_hours.last().map(|of_plan| row.line(of_plan, of) + "\n"));
         }
         text
-    }
-
-    /// One scan.
-    fn line(name: &str, scan: &Precision, efficiency: f64, of: &[usize]) -> String {
-        let cell = |e: &[f64; 3]| format!("{:>CELL$}", format!("{} ({})", percent(e[1]), brief(e[2])));
-        let cells: Vec<String> = of.iter().map(|&k| cell(&scan.errors[k])).collect();
-        let hours = significant(scan.hours);
-        let share = significant(100.0 * efficiency);
-        format!("{name:13}{:>7}{hours:>8}{share:>7}{}", scan.stops, cells.join(""))
     }
 
     fn object(&self, out: &Path) -> Value {
@@ -296,7 +313,7 @@ impl Table {
             let points = self.hours().into_iter().zip(self.against(i));
             points.map(|(hours, errors)| json!({ "hours": hours, "median": median(errors) })).collect()
         };
-        let scan = |(i, (name, of, efficiency)): (usize, &(String, Precision, f64))| {
+        let scan = |(i, Row { name, precision: of, efficiency, .. }): (usize, &Row)| {
             json!({
                 "scan": name, "stops": of.stops, "readings": of.rows, "hours": of.hours, "efficiency": efficiency,
                 "errors": errors(of), "against_hours": against(i),

@@ -27,7 +27,7 @@ pub(in crate::cli) struct Shared {
     /// How samples count
     #[arg(long, default_value = "solid-angle", value_parser = parse_weights, value_name = "solid-angle|uniform", help_heading = SAMPLES)]
     pub weights: WeightMode,
-    /// Weigh by the σ that the file states, instead of the solid angle
+    /// Weigh by the errors that the file states, σ and what values share, instead of the solid angle
     #[arg(long, conflicts_with = "weights", help_heading = SAMPLES)]
     pub use_sigma: bool,
     /// Leave out samples with θi or θo above this, degrees

@@ -15,7 +15,7 @@ mod prior;
 mod rounding;
 
 pub use planner::{Plan, Wish, plan};
-pub use precision::{Precision, QUANTILES, precision};
+pub use precision::{Precision, QUANTILES, precision, precisions};
 pub use prior::{Prior, Range, Wrong};
 
 /// Polar angles beyond this are not planned, degrees: a fit leaves them out too.

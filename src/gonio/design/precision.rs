@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::MAX_ANGLE_DEG;
 use super::candidates::Pair;
 use super::information::{Model, Noise};
-use super::optimum::information;
 use super::prior::Prior;
 use crate::geometry::angles::theta_of;
 use crate::gonio::cost::hours;
@@ -33,16 +32,18 @@ pub struct Precision {
     pub mean_ln_det: f64,
     /// The same with what readings share: minus the mean of ln det of the covariance.
     pub(super) mean_ln_sure: f64,
-    /// At each draw of the prior.
-    told: Vec<Told>,
 }
 
-/// What a scan tells at one draw of the prior.
-#[derive(Debug, Clone, PartialEq)]
+/// What a scan tells at one draw of the prior. A fit weighs readings by all of their errors.
+#[derive(Debug, Clone)]
 struct Told {
     /// Information of the noise, parameters by parameters.
     own: DMatrix<f64>,
-    /// The same times what each shared error moves: parameters by errors.
+    /// A: the same by the fit's weights.
+    normal: DMatrix<f64>,
+    /// What the noise adds to the scatter of the fit's normal equations.
+    spread: DMatrix<f64>,
+    /// What each shared error of 1 σ does to them: parameters by errors.
     shared: DMatrix<f64>,
 }
 
@@ -52,29 +53,46 @@ pub const QUANTILES: [f64; 3] = [0.1, 0.5, 0.9];
 /// The precision of a scan whose rows are read in this order, over the prior's draws.
 #[must_use]
 pub fn precision(prior: &Prior, instrument: &Instrument, directions: &Directions, rows: &[u32]) -> Precision {
+    precisions(prior, instrument, (directions, rows), &[]).0
+}
+
+/// The same, and of that scan read so often that it takes each of these hours: what readings share stays.
+#[must_use]
+pub fn precisions(
+    prior: &Prior,
+    instrument: &Instrument,
+    (directions, rows): (&Directions, &[u32]),
+    in_hours: &[f64],
+) -> (Precision, Vec<Precision>) {
     let stops = stops(instrument, rows);
     let mut lengths: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     stops.iter().for_each(|(row, n)| lengths.entry(*row).or_default().push(*n));
     let of_pair = |(row, list): (u32, Vec<usize>)| (directions.pair(row as usize), list);
-    let told: Vec<(Pair, Vec<usize>)> =
+    let read: Vec<(Pair, Vec<usize>)> =
         lengths.into_iter().map(of_pair).filter(|(pair, _)| counts(*pair, instrument)).collect();
     let (model, noise, kept) = (Model::of(prior), Noise::of(instrument), Kept::of(instrument));
-    let draws = prior.draws();
-    let each: Vec<Told> = draws.par_iter().map(|draw| at(&model, (&noise, &kept), draw, &told)).collect();
-    let hours = hours(instrument, directions, rows);
-    Precision::new(hours, (stops.len(), rows.len()), each)
+    let once = hours(instrument, directions, rows);
+    let times: Vec<f64> = std::iter::once(1.0).chain(in_hours.iter().map(|hours| hours / once)).collect();
+    let each: Vec<Vec<Told>> =
+        prior.draws().par_iter().map(|draw| at(&model, (&noise, &kept), draw, &read, &times)).collect();
+    let of = |i: usize| {
+        let told: Vec<&Told> = each.iter().map(|of_times| &of_times[i]).collect();
+        Precision::new(once * times[i], (stops.len(), rows.len()), &told)
+    };
+    (of(0), (1..times.len()).map(of).collect())
 }
 
 impl Precision {
-    fn new(hours: f64, (stops, rows): (usize, usize), told: Vec<Told>) -> Self {
-        let errors: Vec<Vec<f64>> = told.iter().map(Told::relative_errors).collect();
+    fn new(hours: f64, (stops, rows): (usize, usize), told: &[&Told]) -> Self {
+        let covariances: Vec<Option<DMatrix<f64>>> = told.iter().map(|of| of.covariance()).collect();
+        let parameters = told.first().map_or(0, |of| of.own.nrows());
         let quantiles = |a: usize| {
-            let mut list: Vec<f64> = errors.iter().map(|e| e[a]).collect();
+            let error = |of: &Option<DMatrix<f64>>| of.as_ref().map_or(f64::INFINITY, |of| of[(a, a)].sqrt());
+            let mut list: Vec<f64> = covariances.iter().map(error).collect();
             list.sort_by(f64::total_cmp);
             QUANTILES.map(|q| list[(q * (list.len() - 1) as f64).round() as usize])
         };
-        let parameters = errors.first().map_or(0, Vec::len);
-        let mean = |of: &dyn Fn(&Told) -> f64| told.iter().map(of).sum::<f64>() / told.len() as f64;
+        let mean = |of: &dyn Fn(&Told) -> f64| told.iter().map(|t| of(t)).sum::<f64>() / told.len() as f64;
         Self {
             hours,
             stops,
@@ -82,16 +100,7 @@ impl Precision {
             errors: (0..parameters).map(quantiles).collect(),
             mean_ln_det: mean(&|t| ln_det(&t.own)),
             mean_ln_sure: mean(&Told::ln_sure),
-            told,
         }
-    }
-
-    /// That of the same scan read so often that it takes `hours`: what readings share stays.
-    #[must_use]
-    pub fn in_hours(&self, hours: f64) -> Self {
-        let times = hours / self.hours;
-        let of = |told: &Told| Told { own: &told.own * times, shared: &told.shared * times };
-        Self::new(hours, (self.stops, self.rows), self.told.iter().map(of).collect())
     }
 }
 
@@ -113,12 +122,17 @@ pub(super) fn counts((wi, wo): Pair, instrument: &Instrument) -> bool {
     theta_of(wi) <= most && theta_of(wo) <= most && !may_be_shadowed(wi, wo, instrument)
 }
 
-/// What all stops tell at one draw of the parameters: pairs with the numbers of rows of their stops.
-fn at(model: &Model, (noise, kept): (&Noise<'_>, &Kept<'_>), draw: &[f64], pairs: &[(Pair, Vec<usize>)]) -> Told {
+/// What all stops tell at one draw of the parameters, read so many times: pairs with the numbers of rows of their stops.
+fn at(
+    model: &Model,
+    (noise, kept): (&Noise<'_>, &Kept<'_>),
+    draw: &[f64],
+    pairs: &[(Pair, Vec<usize>)],
+    times: &[f64],
+) -> Vec<Told> {
     let p = model.parameters();
-    let (mut list, mut weights) = (Vec::with_capacity(pairs.len() * p), Vec::with_capacity(pairs.len()));
+    let mut told = vec![Told::new(p, kept.len()); times.len()];
     let mut gradient = vec![0.0; p];
-    let mut shared = DMatrix::zeros(p, kept.len());
     let truth = |wi, wo, out: &mut [f64]| {
         out[0] = model.value(draw, (wi, wo), &mut vec![0.0; p]);
         true
@@ -127,42 +141,57 @@ fn at(model: &Model, (noise, kept): (&Noise<'_>, &Kept<'_>), draw: &[f64], pairs
         let f = model.value(draw, *pair, &mut gradient);
         let Some(own) = noise.variance(f, *pair) else { continue };
         let jitter = noise.jitter(model, draw, *pair);
-        let weight: f64 = stops.iter().map(|rows| 1.0 / (own / *rows as f64 + jitter)).sum();
-        for (k, u) in kept.components(*pair, f, &truth).into_iter().enumerate() {
-            (0..p).for_each(|a| shared[(a, k)] += weight * gradient[a] * u);
-        }
-        list.extend_from_slice(&gradient);
-        weights.push(weight);
+        let once: f64 = stops.iter().map(|rows| 1.0 / (own / *rows as f64 + jitter)).sum();
+        let shared = kept.components(*pair, f, &truth);
+        told.iter_mut().zip(times).for_each(|(told, times)| told.add(&gradient, 1.0 / (once * times), &shared));
     }
-    Told { own: information(p, &list, &weights), shared }
+    told
 }
 
 impl Told {
-    /// What shared errors of 1 σ move the parameters by, A⁻¹ G, and the diagonal of A⁻¹; nothing where A is singular.
-    fn solved(&self) -> Option<(Vec<f64>, DMatrix<f64>)> {
-        let m = &self.own;
-        let diagonal: Vec<f64> = m.diagonal().iter().map(|d| d.sqrt()).collect();
+    fn new(parameters: usize, shared: usize) -> Self {
+        let nothing = DMatrix::zeros(parameters, parameters);
+        Self {
+            own: nothing.clone(),
+            normal: nothing.clone(),
+            spread: nothing,
+            shared: DMatrix::zeros(parameters, shared),
+        }
+    }
+
+    /// Adds a reading of this variance of its own, and these errors that it shares.
+    fn add(&mut self, gradient: &[f64], own: f64, shared: &[f64]) {
+        let weight = 1.0 / (own + shared.iter().map(|u| u * u).sum::<f64>());
+        let g = DVector::from_column_slice(gradient);
+        self.own.ger(1.0 / own, &g, &g, 1.0);
+        self.normal.ger(weight, &g, &g, 1.0);
+        self.spread.ger(weight * weight * own, &g, &g, 1.0);
+        self.shared.ger(weight, &g, &DVector::from_column_slice(shared), 1.0);
+    }
+
+    /// A⁻¹ (B + G Gᵀ) A⁻¹; nothing where A is singular.
+    fn covariance(&self) -> Option<DMatrix<f64>> {
+        let diagonal: Vec<f64> = self.normal.diagonal().iter().map(|d| d.sqrt()).collect();
         if diagonal.contains(&0.0) {
             return None;
         }
         // Scaled to a diagonal of ones: weights and exponents may differ by many decades.
-        let scaled = DMatrix::from_fn(m.nrows(), m.ncols(), |a, b| m[(a, b)] / (diagonal[a] * diagonal[b]));
-        let inverse = scaled.cholesky()?.inverse();
-        let inverse = DMatrix::from_fn(m.nrows(), m.ncols(), |a, b| inverse[(a, b)] / (diagonal[a] * diagonal[b]));
-        Some((inverse.diagonal().iter().copied().collect(), inverse * &self.shared))
+        let scaled =
+            |m: &DMatrix<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |a, b| m[(a, b)] / diagonal[a] / diagonal[b]);
+        let inverse = scaled(&self.normal).cholesky()?.inverse();
+        let covariance = &inverse * scaled(&self.scatter()) * &inverse;
+        Some(scaled(&covariance))
     }
 
-    /// Standard errors: √ of the diagonal of A⁻¹ + A⁻¹ G Gᵀ A⁻¹; infinite where A is singular.
-    fn relative_errors(&self) -> Vec<f64> {
-        let Some((own, moved)) = self.solved() else { return vec![f64::INFINITY; self.own.nrows()] };
-        own.iter().enumerate().map(|(a, v)| (v + moved.row(a).norm_squared()).sqrt()).collect()
+    /// B + G Gᵀ.
+    fn scatter(&self) -> DMatrix<f64> {
+        &self.spread + &self.shared * self.shared.transpose()
     }
 
-    /// Minus ln det of that covariance: ln det A − ln det(1 + Gᵀ A⁻¹ G).
+    /// Minus ln det of the covariance; −∞ where A is singular.
     fn ln_sure(&self) -> f64 {
-        let Some((_, moved)) = self.solved() else { return f64::NEG_INFINITY };
-        let more = DMatrix::identity(moved.ncols(), moved.ncols()) + self.shared.transpose() * moved;
-        ln_det(&self.own) - ln_det(&more)
+        let normal = ln_det(&self.normal);
+        if normal == f64::NEG_INFINITY { normal } else { 2.0 * normal - ln_det(&self.scatter()) }
     }
 }
 
