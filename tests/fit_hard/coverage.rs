@@ -240,19 +240,19 @@ fn intervals_allow_for_a_sigma_that_follows_the_noise() {
 #[test]
 fn samples_weigh_by_the_errors_that_they_share_too() {
     let truth = material(&[0.05], &[0.5], 1000.0);
-    let exact = exact(&truth, &Scan::InPlane { step_deg: 1.0 });
-    let peak = exact.values.iter().copied().fold(0.0, f64::max);
+    let scan = Scan::InPlane { step_deg: 1.0 };
+    let exact = || exact(&truth, &scan);
+    let right = exact().values;
+    let peak = right.iter().copied().fold(0.0, f64::max);
     let is_flank = |y: f64| y > 0.03 && y < 0.05 * peak;
-    let shared: Vec<f64> = exact.values.iter().map(|y| if is_flank(*y) { 0.5 * y } else { 0.0 }).collect();
-    let sigma: Vec<f64> = exact.values.iter().map(|y| 1e-3 * y).collect();
+    let shared: Vec<f64> = right.iter().map(|y| if is_flank(*y) { 0.5 * y } else { 0.0 }).collect();
+    let sigma: Vec<f64> = right.iter().map(|y| 1e-3 * y).collect();
     assert!(shared.iter().filter(|u| **u > 0.0).count() > 40);
     let o = FitOptions { use_sigma: true, ..options("lambert+phong") };
     for sign in [1.0, -1.0] {
-        let values = exact.values.iter().zip(&shared).map(|(y, u)| y + sign * u).collect();
-        let sigma = Some(sigma.clone());
-        let told = Measurement { values, sigma, common: vec![shared.clone()], ..exact.clone() };
-        let untold = Measurement { common: Vec::new(), ..told.clone() };
-        let [told, untold] = [told, untold].map(|m| solved(&m, &o));
+        let values: Vec<f64> = right.iter().zip(&shared).map(|(y, u)| y + sign * u).collect();
+        let with = |common| Measurement { values: values.clone(), sigma: Some(sigma.clone()), common, ..exact() };
+        let [told, untold] = [vec![shared.clone()], Vec::new()].map(|common| solved(&with(common), &o));
         let off = |of: &Material| (of.lobes[1].shape_of(0).expect("a shape")[0] / 1000.0).ln();
         println!("{sign}: off by {:.2e}, by their own σ {:.2e}", off(&told), off(&untold));
         assert!(off(&told).abs() < 1e-3 && off(&untold).abs() > 0.1);
