@@ -45,7 +45,7 @@ pub use raw::Raw;
 pub use raw_file::described;
 pub use reading::{Kind, Reading};
 pub use reduce::{Budget, Line, ReduceError, Reduction, Type, reduce};
-pub use scan::Scan;
+pub use scan::{MOST_ENTRIES, Scan, hemisphere_pairs};
 pub use scan_name::ScanError;
 pub use series::{MOST_READINGS, readings, series, too_many};
 pub use simulate::{Truth, simulate};

@@ -54,8 +54,8 @@ pub(super) const IN_PLANE_DEG: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 /// How far the detector goes to each side of the normal in them, degrees.
 pub(super) const MOST_DEG: f64 = 85.0;
 
-/// Most entries a scan may have: 16 million pairs with three channels take about 2.5 GB.
-const MOST: f64 = 16e6;
+/// Most pairs of directions that a scan may have: 16 million with three channels take about 2.5 GB.
+pub const MOST_ENTRIES: f64 = 16e6;
 
 impl Scan {
     /// Flat world or space; an adaptive scan belongs to that of the material.
@@ -155,11 +155,23 @@ fn plane_pairs(incidences_deg: &[f64], detector_deg: &[f64]) -> Directions {
     Directions::List { wi, wo }
 }
 
+/// Of a scan all round: rings about the normal, and directions on each.
+fn rings(step_deg: f64) -> (usize, usize) {
+    let polar = ((90.0 - 1e-9) / step_deg).floor() as usize;
+    (polar, (360.0 / step_deg).round().max(1.0) as usize)
+}
+
+/// Pairs of directions of the scan `hemisphere:STEP`, not listed: of every incidence the normal and all that is round it.
+#[must_use]
+pub fn hemisphere_pairs(step_deg: f64) -> f64 {
+    let (polar, around) = rings(step_deg);
+    (polar as f64 + 1.0) * (1.0 + polar as f64 * around as f64)
+}
+
 /// θi at azimuth 180°, so that the mirror direction lies at φo = 0.
 fn hemisphere(step_deg: f64) -> Option<(Directions, Weights)> {
-    let polar = ((90.0 - 1e-9) / step_deg).floor() as usize;
-    let around = (360.0 / step_deg).round().max(1.0) as usize;
-    if ((polar + 1) as f64).powi(2) * around as f64 > MOST {
+    let (polar, around) = rings(step_deg);
+    if hemisphere_pairs(step_deg) > MOST_ENTRIES {
         return None;
     }
     let theta_deg: Vec<f64> = (0..=polar).map(|k| k as f64 * step_deg).collect();
@@ -194,6 +206,10 @@ mod tests {
         let sum: f64 = (0..directions.len()).map(|i| weights.get(i)).sum();
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
         assert_eq!(directions.len(), 9 * (1 + 8 * 36));
+        for step_deg in [45.0, 10.0, 7.0] {
+            let listed = Scan::Hemisphere { step_deg }.directions().expect("small").0.len();
+            assert_eq!(hemisphere_pairs(step_deg), listed as f64, "step {step_deg}");
+        }
         assert!(Scan::Hemisphere { step_deg: 0.1 }.directions().is_none());
     }
 
