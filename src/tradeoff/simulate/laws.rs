@@ -102,9 +102,7 @@ fn of_exposure(instrument: &Instrument, shown: Shown) -> [Law; 3] {
 /// Of errors of parameters against the pairs of directions, the coarsest of steps being that, degrees.
 fn of_step(instrument: &Instrument, truth: &Material, coarsest_deg: f64, shown: Shown) -> Law {
     let sampled = Law { theory: Theory::Exactly(-0.5), why: "as many independent readings" };
-    let shapes = (0..truth.channels.len()).flat_map(|c| truth.lobes.iter().filter_map(move |lobe| lobe.shape_of(c)));
-    let sharpest = shapes.flatten().fold(0.0, f64::max);
-    if sharpest * coarsest_deg.to_radians().powi(2) > RESOLVED {
+    if !resolves(truth, coarsest_deg) {
         return Law {
             theory: Theory::Unknown,
             why: "a lobe is narrower than the coarsest step: how many readings see it depends on where they stand",
@@ -114,6 +112,13 @@ fn of_step(instrument: &Instrument, truth: &Material, coarsest_deg: f64, shown: 
         return CURVED;
     }
     if instrument.is_plain() { sampled } else { shared(sampled, -0.5, SHARED) }
+}
+
+/// Whether a step (degrees) is finer than every lobe.
+pub(in crate::tradeoff) fn resolves(truth: &Material, step_deg: f64) -> bool {
+    let shapes = (0..truth.channels.len()).flat_map(|c| truth.lobes.iter().filter_map(move |lobe| lobe.shape_of(c)));
+    let sharpest = shapes.flatten().fold(0.0, f64::max);
+    sharpest * step_deg.to_radians().powi(2) <= RESOLVED
 }
 
 /// What trials of a knob showed says of its laws; `steps_deg` are those of the scan that were tried.
