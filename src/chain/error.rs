@@ -92,6 +92,19 @@ pub enum ChainError {
         /// The scan.
         scan: String,
     },
+    /// Tables of more directions than there is room for.
+    #[error(
+        "tables with steps of {steps} degrees: expected at most {most} million pairs of directions in all, found {found:.1} million; \
+         choose fewer or larger steps"
+    )]
+    TooManyDirections {
+        /// The steps, degrees.
+        steps: String,
+        /// Pairs of directions of all tables, millions.
+        found: f64,
+        /// What they may be.
+        most: f64,
+    },
     /// A simulation with too many raw readings.
     #[error("{0}")]
     TooManyReadings(String),

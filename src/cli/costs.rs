@@ -15,7 +15,7 @@ use crate::measurement::{ReadOptions, formats};
 use crate::render::{Material, Options};
 use crate::report::run::{EFFECTS, SWEEP};
 use crate::tradeoff::fit::FitSweep;
-use crate::tradeoff::render::{RenderSweep, Way};
+use crate::tradeoff::render::{RenderSweep, Tables, Way};
 use crate::tradeoff::{Effort, Sweep, fit, render};
 
 /// Trials of each setting, of the fit and of the picture, which takes ten times as long.
@@ -86,6 +86,7 @@ fn of_picture(
         targets: Vec::new(),
         ways: vec![Way::Scene, Way::Full],
         reference: None,
+        tables: Tables::default(),
     };
     let found = render::sweep(stage, Some(subject), &what, effort, ui.control())?;
     let Demo { scene, name, .. } = demo;

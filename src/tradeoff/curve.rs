@@ -52,6 +52,9 @@ pub struct Curve {
     pub cost: Cost,
     /// Name of the measure that counts.
     pub main: &'static str,
+    /// The commands that its settings' options go with, one each, where they are not the sweep's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub commands: Vec<Vec<String>>,
     /// The settings, as they were tried.
     pub points: Vec<Point>,
     /// Slopes in log-log, for measures that have enough points.
@@ -181,6 +184,7 @@ pub(super) fn curves<S>(
             axis: series.knob.axis(),
             cost: series.cost,
             main: measures[series.main].name,
+            commands: Vec::new(),
             points,
             slopes,
             whole: series.whole,

@@ -28,6 +28,8 @@ pub enum Knob {
     Dwell,
     /// Step of the scan, degrees.
     Step,
+    /// Step of the table that is rendered in the material's place, degrees.
+    Resolution,
     /// How the time of the whole chain is shared out.
     Shares,
 }
@@ -47,6 +49,7 @@ impl Knob {
             Self::Readings => "readings a pair of directions",
             Self::Dwell => "exposure, times the instrument's own",
             Self::Step => "pairs of directions",
+            Self::Resolution => "step of the table, degrees",
             Self::Shares => "time in all",
         }
     }
@@ -84,6 +87,7 @@ impl Knob {
             Self::Readings => format!("--readings {size:.0}"),
             Self::Dwell => format!("exposures × {}", short(size)),
             Self::Order => format!("order {size:.0}"),
+            Self::Resolution => format!("--scan hemisphere:{size}"),
             Self::Effects | Self::Step | Self::Shares => String::new(),
         }
     }

@@ -1,6 +1,10 @@
 //! `tradeoff`: curves, their slopes, files, advice. All that is tested is the same whatever the clock says.
 
-use serde_json::Value;
+use goniofit::chain;
+use goniofit::control::Control;
+use goniofit::measurement::{ReadOptions, formats};
+use goniofit::tradeoff::render::scanned;
+use serde_json::{Value, json};
 
 use crate::bench::{Bench, number};
 
@@ -199,6 +203,98 @@ fn ways_to_find_lights_differ_in_noise_alone() {
         "{}",
         ran.err
     );
+}
+
+/// What a table's step costs: a lobe of n = 20 that is joined by straight lines is off by the square of it, and the table's end below 90° stands apart.
+#[test]
+fn a_table_is_off_by_the_square_of_its_step() {
+    let b = Bench::new();
+    let material = json!({ "format": "goniofit-material", "version": 1, "model": "lambert+phong", "channels": ["r"],
+        "lobes": [ { "kind": "lambert", "weight": [0.1] },
+                   { "kind": "phong", "weight": [0.5], "shape": { "exponent": 20.0 } } ] });
+    b.write("gloss.json", material.to_string());
+    let args = "tradeoff render --scene sphere --material gloss.json --size 24 --samples 128 --reference 256 --trials 8 --ways scene --seed 3";
+    let found = b.json(&typed(&format!("{args} --resolutions 5,15,10")));
+    let name = "resolution of the table";
+    let points = curve(&found, name)["points"].as_array().expect("points");
+    let steps: Vec<f64> = points.iter().map(|p| number(&p["size"])).collect();
+    assert_eq!(steps, [15.0, 10.0, 5.0]);
+    // A second a pair: of 15° six incidences of the normal and five rings of 24.
+    assert_eq!(number(&points[0]["instrument_s"]), 726.0);
+    let bias = errors(&found, name, "bias");
+    println!("bias {bias:?}, slope {}", slope(&found, name, "bias"));
+    // n h² is 1.37, 0.61 and 0.15: a lobe alone would be off by 2.16 and 3.89 times as much as the next. The bias of 5° is known to a tenth.
+    assert!((1.7..2.8).contains(&(bias[0] / bias[1])) && (2.8..5.3).contains(&(bias[1] / bias[2])), "{bias:?}");
+    let slope = slope(&found, name, "bias");
+    assert!((1.6..2.3).contains(&slope), "{slope}");
+    assert_eq!(theory(&found, name, "bias"), ("between".into(), vec![2.0, 1.7]));
+    // The rim beyond the last ring is as wide as the step, and dark.
+    let unmeasured = errors(&found, name, "unmeasured");
+    assert!(unmeasured.windows(2).all(|pair| pair[0] > pair[1]) && unmeasured[2] > bias[2], "{unmeasured:?}");
+    let laws = curve(&found, name)["slopes"].as_array().expect("slopes").iter().filter(|s| !s["law"].is_null()).count();
+    assert_eq!(laws, 1, "of the bias alone");
+    // A lobe that is narrower than the step has no law, and neither has a table.
+    b.ok(&typed("simulate --material gloss.json --noiseless --scan hemisphere:5 --out gloss.csv"));
+    let quick = "tradeoff render --scene sphere --size 16 --samples 64 --reference 128 --trials 6 --ways scene --resolutions 30,20,15";
+    for (material, why) in [("glossy-paint", "narrower than the coarsest step"), ("gloss.csv", "not known")] {
+        let found = b.json(&typed(&format!("{quick} --material {material}")));
+        assert_eq!(theory(&found, name, "bias").0, "unknown", "{material}");
+        let slopes = curve(&found, name)["slopes"].to_string();
+        assert!(slopes.contains(why), "{material}: {slopes}");
+    }
+}
+
+/// A setting of a table is of two commands, which do what was swept; advice takes none of them.
+#[test]
+fn the_commands_of_a_table_read_it_and_render_it() {
+    let b = Bench::new();
+    let args = typed(
+        "tradeoff render --scene sphere --material satin --size 8 --samples 4,16 --trials 2 --ways scene --resolutions 15,30 --out t",
+    );
+    let found = b.json(&args);
+    assert_eq!(timeless(&b.json(&[&args[..], &["--threads", "1"]].concat())), timeless(&found));
+    let curve = curve(&found, "resolution of the table");
+    let read = typed("goniofit simulate --material satin --instrument ideal --out OUT.csv");
+    let render = typed("goniofit render --scene sphere --material OUT.csv --size 8x8 --out OUT.exr");
+    assert_eq!(curve["commands"], json!([read, render]));
+    let settings: Vec<&str> =
+        curve["points"].as_array().expect("points").iter().map(|p| p["setting"].as_str().expect("a setting")).collect();
+    assert_eq!(settings, ["--scan hemisphere:30 --samples 16", "--scan hemisphere:15 --samples 16"]);
+    let options = typed(settings[1]);
+    b.ok(&[&read[1..], &options[..2]].concat());
+    b.ok(&[&render[1..], &options[2..]].concat());
+    let picture = b.exr("OUT.exr");
+    assert_eq!((picture.width, picture.metadata.samples), (8, Some(16)));
+    // What is swept is what is written, bit by bit.
+    let written = formats::read(&b.path("OUT.csv"), &ReadOptions::default()).expect("reads");
+    let satin = chain::load("satin", &ReadOptions::default()).expect("built in");
+    let swept = scanned("satin", &satin, 15.0, Control::silent()).expect("measures");
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&written.values), bits(&swept.values));
+    let text = b.ok(&[&args[..], &["--advise", "time=10m"]].concat()).text();
+    let (table, advice) = text.rsplit_once("time=10m").expect("advice");
+    assert!(table.contains(&format!("\n    {}\n    {}\n", read.join(" "), render.join(" "))), "{table}");
+    assert!(advice.contains("(plan of the scene"), "{advice}");
+    assert!(table.lines().filter(|l| !l.contains("goniofit ")).all(|l| l.chars().count() <= 80), "{table}");
+    assert!(b.text("t/tradeoff.csv").contains("unmeasured_low"), "a column of its own");
+    b.ok(&["report", "t"]);
+    let page = b.text("t/report.html");
+    assert!(page.contains("Settings of resolution of the table are options of: goniofit simulate"), "{page}");
+}
+
+#[test]
+fn steps_that_no_table_can_have_are_refused_before_any_picture() {
+    let b = Bench::new();
+    for (args, says) in [
+        ("--material satin --resolutions 10,60", "from 0.1 to 45 degrees"),
+        ("--material satin --resolutions 10,0.5", "at most 16 million pairs of directions in all, found 23.2 million"),
+        ("--material satin --resolutions 45", "satin along hemisphere:45: 0 of 2 incidences cover the hemisphere"),
+        ("--resolutions 10", "--material"),
+        ("--scene gradient-sweep --material satin --resolutions 30", "other exponents, which a table has not"),
+    ] {
+        let ran = b.run(&typed(&format!("tradeoff render --size 8 --samples 4 --trials 1 --ways scene {args}")));
+        assert!(ran.code == Some(2) && ran.err.contains(says), "{args}: {}", ran.err);
+    }
 }
 
 #[test]

@@ -11,7 +11,7 @@ use goniofit::gonio::{Instrument, Scan};
 use goniofit::measurement::Measurement;
 use goniofit::tradeoff::chain::ChainSweep;
 use goniofit::tradeoff::fit::FitSweep;
-use goniofit::tradeoff::render::{RenderSweep, Way};
+use goniofit::tradeoff::render::{RenderSweep, Tables, Way};
 use goniofit::tradeoff::simulate::SimulateSweep;
 use goniofit::tradeoff::{Advice, Effort, Sweep, Trial, Wish, advise};
 
@@ -124,6 +124,7 @@ pub fn render_with(scene: &str, sweeps: u64, trials: u32, side: u32, wish: &Wish
             targets: vec![],
             ways: vec![Way::Scene],
             reference: Some(reference),
+            tables: Tables::default(),
         };
         goniofit::tradeoff::render::sweep(&stage, None, &what, &effort, Control::silent()).expect("renders")
     };

@@ -33,7 +33,7 @@ pub(super) struct Args {
 enum Stage {
     /// Samples used, loss, model: against excess rmse, parameters, picture
     Fit(fit::Args),
-    /// Samples, plan of effects, depth, how lights are found: against error, noise, bias, ꟻLIP
+    /// Samples, plan of effects, depth, how lights are found, resolution of a table: against error, noise, bias, ꟻLIP
     Render(render::Args),
     /// Quadratures and effects in the computer's time; readings, exposure, step in the instrument's
     Simulate(simulate::Args),

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::advice::short;
 use crate::numeric::estimate::Estimate;
+use crate::report;
 use crate::tradeoff::{Cost, Curve, Point, Slope, Standing, Sweep};
 
 /// Columns of the terminal.
@@ -49,10 +50,11 @@ fn table(sweep: &Sweep, curve: &Curve) -> String {
         Cost::Instrument => "instrument",
         Cost::Both => "in all",
     };
-    let fits = curve.name.chars().count() <= first + 2;
+    let before = first + 2 - whose.len().saturating_sub(8);
+    let fits = curve.name.chars().count() <= before;
     let lead = if fits { String::new() } else { format!("\n{}", curve.name) };
     let name = if fits { &curve.name[..] } else { "" };
-    let mut text = format!("{lead}\n{name:<w$}{whose:>8}{:>14}", curve.main, w = first + 2);
+    let mut text = format!("{lead}\n{name:<before$}{whose:>8}{:>14}", curve.main);
     text.push_str(&" ".repeat(WITH - 8));
     for m in &others {
         let _ = write!(text, "{:>WITHOUT$}", sweep.measures[*m].name);
@@ -74,6 +76,10 @@ fn table(sweep: &Sweep, curve: &Curve) -> String {
         let why = slope.law.map(|law| law.why).filter(|why| !said.contains(why));
         said.extend(why);
         text.push_str(&filled(&slope_said(curve, slope, why), 4));
+    }
+    if !curve.commands.is_empty() {
+        text.push_str("  settings are options of these commands, one each:\n");
+        curve.commands.iter().for_each(|words| _ = writeln!(text, "    {}", report::typed(words)));
     }
     text
 }

@@ -3,15 +3,17 @@
 use std::path::PathBuf;
 
 use super::Common;
-use crate::chain::{self, Stage};
+use crate::chain::{self, Source, Stage};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::render::{parse_rgb, parse_size, read_stage};
 use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
+use crate::gonio::Scan;
 use crate::measurement::ReadOptions;
-use crate::render::Strategy;
-use crate::tradeoff::render::{RenderSweep, Way, sweep};
+use crate::render::{Material, Strategy};
+use crate::tradeoff::Knob;
+use crate::tradeoff::render::{RenderSweep, Tables, Way, sweep};
 
 /// Longer side of the pictures, pixels, where none is asked for.
 const SIDE: f64 = 64.0;
@@ -20,7 +22,8 @@ const SIDE: f64 = 64.0;
 #[command(after_help = "Examples:
   goniofit tradeoff render --scene cornell --out tradeoff/
   goniofit tradeoff render my-scene.toml --material gold.json --advise error=1% --advise time=10s
-  goniofit tradeoff render --scene cornell --ways scene,full,independent --depths 1,2,4 --targets 10%,5%,2%")]
+  goniofit tradeoff render --scene cornell --ways scene,full,independent --depths 1,2,4 --targets 10%,5%,2%
+  goniofit tradeoff render --material satin --ways scene --samples 256 --resolutions 15,10,5")]
 pub(super) struct Args {
     /// A scene file; `-` is stdin
     #[arg(value_name = "SCENE.toml", conflicts_with = "scene")]
@@ -50,6 +53,10 @@ pub(super) struct Args {
     /// Scattering events of a path at most, to try beside the scene's
     #[arg(long, value_delimiter = ',', value_name = "N,N,…", value_parser = clap::value_parser!(u32).range(0..=1000))]
     depths: Vec<u32>,
+    /// How finely the material is measured, to try: steps in degrees (0.1 to 45) of the scan `hemisphere:STEP` by the ideal instrument, whose table is
+    /// rendered in the material's place at the most samples. A setting is of two commands, which the result names; advice takes none of them
+    #[arg(long, value_delimiter = ',', value_name = "STEP,STEP,…", requires = "material", value_parser = parse_step)]
+    resolutions: Vec<f64>,
     /// Samples per pixel of each of the reference's two pictures [default: 4 times the most]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     reference: Option<u32>,
@@ -71,6 +78,14 @@ fn parse_way(text: &str) -> Result<Way, String> {
     }
 }
 
+/// The step of a scan all round, degrees.
+fn parse_step(text: &str) -> Result<f64, String> {
+    match format!("hemisphere:{}", text.trim()).parse::<Scan>() {
+        Ok(Scan::Hemisphere { step_deg }) => Ok(step_deg),
+        _ => Err("expected steps from 0.1 to 45 degrees".into()),
+    }
+}
+
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     args.common.prepare()?;
     let (stage, named) = match (&args.file, &args.scene) {
@@ -80,11 +95,14 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
             (Stage::built_in(name)?, option("scene", Some(name)))
         }
     };
-    let subject = match &args.material {
+    let (subject, tables) = match &args.material {
         Some(name) => {
-            Some(chain::render_material(name, &chain::load(name, &ReadOptions::default())?, args.rgb.as_ref())?)
+            let source = chain::load(name, &ReadOptions::default())?;
+            let subject = chain::render_material(name, &source, args.rgb.as_ref())?;
+            let tables = args.tables((name.as_str(), &source), &subject, ui)?;
+            (Some(subject), tables)
         }
-        None => None,
+        None => (None, Tables::default()),
     };
     let [width, height] = stage.spec.film.resolution.map(f64::from);
     let small = |side: f64| (side * (SIDE / width.max(height)).min(1.0)).round().max(1.0) as u32;
@@ -94,18 +112,41 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let mut samples = args.samples.clone();
     samples.sort_unstable();
     samples.dedup();
-    let what = RenderSweep { size, samples, targets: args.targets.clone(), ways, reference: args.reference };
+    let what = RenderSweep { size, samples, targets: args.targets.clone(), ways, reference: args.reference, tables };
     let effort = args.common.effort(args.seed, ui);
     let mut found = sweep(&stage, subject.as_ref(), &what, &effort, ui.control())?;
-    found.commands = vec![base(args, named, size)];
+    found.commands = vec![base(args, &named, size, args.material.as_deref())];
+    for curve in found.curves.iter_mut().filter(|curve| curve.knob == Knob::Resolution) {
+        curve.commands = vec![reading(args), base(args, &named, size, Some(TABLE))];
+    }
     args.common.finish(&found, None, ui)
 }
 
-/// The command that settings go with: the scene is `named` so.
-fn base(args: &Args, named: Vec<String>, (width, height): (u32, u32)) -> Vec<String> {
+impl Args {
+    /// The tables that are asked for, the coarsest first.
+    fn tables(&self, source: (&str, &Source), subject: &Material, ui: &Ui) -> Result<Tables, Failure> {
+        let mut steps = self.resolutions.clone();
+        steps.sort_by(|a, b| b.total_cmp(a));
+        steps.dedup();
+        Ok(Tables::read(source, subject, self.rgb.as_ref(), &steps, ui.control())?)
+    }
+}
+
+/// What the material is read into.
+const TABLE: &str = "OUT.csv";
+
+/// The command that reads a table.
+fn reading(args: &Args) -> Vec<String> {
+    let options =
+        [option("material", args.material.as_ref()), option("instrument", Some("ideal")), option("out", Some(TABLE))];
+    command(&["goniofit", "simulate"], options)
+}
+
+/// The command that settings go with: the scene is `named` so, the subject's material so.
+fn base(args: &Args, named: &[String], (width, height): (u32, u32), material: Option<&str>) -> Vec<String> {
     let options = [
-        named,
-        option("material", args.material.as_ref()),
+        named.to_vec(),
+        option("material", material),
         option("rgb", args.rgb.as_ref().map(|names| names.join(","))),
         option("size", Some(format!("{width}x{height}"))),
         option("out", Some("OUT.exr")),

@@ -110,9 +110,10 @@ fn sweep(found: &views::Sweep) -> Sweep {
     let chart = |plot: views::SweepPlot| (format!("{}; bars are 95 % intervals.", plot.shows), plot.figure.inline());
     let slopes = found.curves.iter().flat_map(|c| c.slopes.iter().filter_map(|s| slope(&c.name, s)));
     let trials = format!("{} of each setting, seed {}", counted(found.trials.into(), "trial"), found.seed);
-    let commands: Vec<String> = found.commands.iter().map(|words| typed(words)).collect();
-    let settings = (!commands.is_empty()).then(|| format!("settings are options of: {}", commands.join(" && ")));
-    let said = std::iter::once(trials).chain(settings).chain(found.reference.clone()).chain(found.notes.clone());
+    let settings = options_of("settings", &found.commands);
+    let others = found.curves.iter().filter_map(|c| options_of(&format!("settings of {}", c.name), &c.commands));
+    let said =
+        std::iter::once(trials).chain(settings).chain(others).chain(found.reference.clone()).chain(found.notes.clone());
     let said = said.map(|line| sentence(&line));
     Sweep {
         title: format!("{}: {}", found.stage, found.subject),
@@ -122,6 +123,12 @@ fn sweep(found: &views::Sweep) -> Sweep {
         charts: found.against_time().into_iter().chain(found.beside_theory()).map(chart).collect(),
         slopes: slopes.collect(),
     }
+}
+
+/// Which commands settings are options of; nothing where none are known.
+fn options_of(settings: &str, commands: &[Vec<String>]) -> Option<String> {
+    let all: Vec<String> = commands.iter().map(|words| typed(words)).collect();
+    (!all.is_empty()).then(|| format!("{settings} are options of: {}", all.join(" && ")))
 }
 
 fn made(made: &Made) -> Option<(String, String)> {

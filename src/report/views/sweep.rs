@@ -58,6 +58,9 @@ pub struct SweepCurve {
     #[serde(default)]
     cost: Cost,
     main: String,
+    /// The commands that its settings' options go with, one each, where they are not the sweep's.
+    #[serde(default)]
+    pub commands: Vec<Vec<String>>,
     points: Vec<Setting>,
     /// Slopes in log-log.
     #[serde(default)]

@@ -50,6 +50,11 @@ impl Truth {
         image.radiance.iter().zip(&self.image.radiance).map(off).collect()
     }
 
+    /// The reference's own error, relative as all are.
+    pub fn deviation(&self) -> f64 {
+        self.square.sqrt()
+    }
+
     pub fn image(&self) -> &Image {
         &self.image
     }
@@ -63,7 +68,7 @@ impl Truth {
 
     /// What the reference is, and how good.
     pub fn said(&self, samples: u32, smallest: f64) -> String {
-        let own = self.square.sqrt();
+        let own = self.deviation();
         let times = if smallest.is_finite() && own > 0.0 {
             format!("; the smallest error measured is {:.1} times that", smallest / own)
         } else {

@@ -1,19 +1,24 @@
-//! What accuracy of a picture costs: samples, the plan of effects, depth, sampler, how lights are found.
+//! What accuracy of a picture costs: samples, the plan of effects, depth, sampler, how lights are found, how finely the
+//! material was measured.
 
 use std::time::Instant;
 
 use super::curve::{About, Beside, Sweep, curves, words};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
-use super::sweep::{Effort, Trial, run};
+use super::sweep::{Effort, Runs, Trial, run};
 use crate::chain::{self, ChainError, Stage};
 use crate::control::Control;
 use crate::image::{Image, compare};
 use crate::render::{self, Material, Options, Plan, Scene, Strategy};
 
 pub(super) mod accumulate;
+mod judges;
+mod resolution;
 
-use accumulate::{Gathered, Truth};
+use accumulate::Gathered;
+use judges::{Judges, seen_whole};
+pub use resolution::{Tables, scanned};
 
 /// What is swept.
 #[derive(Debug, Clone)]
@@ -28,6 +33,8 @@ pub struct RenderSweep {
     pub ways: Vec<Way>,
     /// Samples per pixel of each half of the reference; 4 times the most of `samples` where none is said.
     pub reference: Option<u32>,
+    /// Tables of the subject to render in its place, at the most of `samples`.
+    pub tables: Tables,
 }
 
 /// A way to render a scene.
@@ -54,12 +61,15 @@ const BETTER: u32 = 4;
 const GIB: f64 = (1u64 << 30) as f64;
 const ROOM: f64 = 4.0 * GIB;
 
-const MEASURES: [Measure; 4] = [
+/// The last is of tables alone.
+const MEASURES: [Measure; 5] = [
     Measure { name: "error", what: "root of the mean of (x − truth)²/(truth² + (L̄/10)²)" },
     Measure { name: "noise", what: "its part that differs from seed to seed" },
     Measure { name: "bias", what: "its part that all seeds share" },
     Measure { name: "flip", what: "mean ꟻLIP against the reference" },
+    Measure { name: "unmeasured", what: "error of the material's picture without what a table does not hold" },
 ];
+const BIAS: usize = 2;
 
 const SOBOL: Law = Law {
     theory: Theory::AtMost(-0.5),
@@ -108,7 +118,11 @@ impl Way {
 /// One picture to take.
 #[derive(Debug, Clone, Copy)]
 struct Shot {
-    way: usize,
+    way: Way,
+    /// Which scene: those of the ways, then those of the tables.
+    scene: usize,
+    /// Which table is in the subject's place.
+    table: Option<usize>,
     samples: u32,
     target: Option<f64>,
 }
@@ -127,41 +141,47 @@ pub fn sweep(
     let began = Instant::now();
     let (series, settings) = design(what);
     within_memory(settings.len(), what.size)?;
-    let scenes: Vec<Scene> = what.ways.iter().map(|way| scene(stage, subject, *way)).collect::<Result<_, _>>()?;
-    let own = chain::scene(stage, subject.cloned())?;
+    what.tables.check(stage)?;
+    let scenes = scenes(stage, subject, what)?;
     let (width, height) = what.size;
     let base = Options { width, height, ..Options::default() };
-    let most = what.samples.iter().copied().max().unwrap_or(FEW);
+    let most = most(what);
     let half = what.reference.unwrap_or(most.saturating_mul(BETTER)).min(1 << 24);
-    let shot = |seed: u64| {
-        let options = Options { samples: half, seed: effort.seed.wrapping_add(seed), ..base };
-        render::render(&own, &options, control).map(|film| film.to_image())
-    };
     // Seeds that no trial has: those are mixed.
-    let truth = Truth::of(&shot(u64::MAX / 2)?, &shot(u64::MAX / 2 + 1)?);
+    let judges = Judges::new(stage, subject, &what.tables, |scene, number| {
+        let seed = effort.seed.wrapping_add(u64::MAX / 2 + number);
+        Ok(render::render(scene, &Options { samples: half, seed, ..base }, control)?.to_image())
+    })?;
+    let measures = measures(what);
     let mut gathered: Vec<Gathered> = settings.iter().map(|_| Gathered::default()).collect();
     let runs = run(&settings, effort, control, |index, turn| {
         let shot = settings[index].what;
         let options = Options { seed: turn.seed, samples: shot.samples, target_error: shot.target, ..base };
-        let (image, seconds) = picture(&scenes[shot.way], what.ways[shot.way], &options, control.quiet())?;
+        let (image, seconds) = picture(&scenes[shot.scene], shot.way, &options, control.quiet())?;
+        let mut errors = vec![f64::NAN; measures.len()];
         if control.stop.requested() {
-            return Ok(Trial { seconds, errors: vec![f64::NAN; 4] });
+            return Ok(Trial { seconds, errors });
         }
+        let truth = judges.of(shot.table);
+        let image = if shot.table.is_some() { seen_whole(image) } else { image };
         if !turn.again {
-            gathered[index].add(&truth, &image);
+            gathered[index].add(truth, &image);
         }
-        let error = truth.error(&image);
-        let flip = compare(&image, truth.image())?.appearance.map_or(f64::NAN, |a| a.flip.mean);
-        Ok::<_, ChainError>(Trial { seconds, errors: vec![error, f64::NAN, f64::NAN, flip] })
+        errors[0] = truth.error(&image);
+        errors[3] = compare(&image, truth.image())?.appearance.map_or(f64::NAN, |a| a.flip.mean);
+        Ok::<_, ChainError>(Trial { seconds, errors })
     })?;
-    let parts = |index: usize, measure: usize| match measure {
-        1 => gathered[index].noise(&truth),
-        2 => gathered[index].bias(&truth),
-        _ => None,
+    let parts = |index: usize, measure: usize| {
+        let table = settings[index].what.table;
+        match measure {
+            1 => gathered[index].noise(judges.of(table)),
+            BIAS => gathered[index].bias(judges.of(table)),
+            4 => judges.unmeasured(table),
+            _ => None,
+        }
     };
-    let beside = Beside { errors: &parts, untold: truth.untold() };
-    let found = curves(&series, &settings, &MEASURES, &runs, &beside);
-    let smallest = runs.trials.iter().flatten().map(|t| t.errors[0]).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
+    let beside = Beside { errors: &parts, untold: judges.of(None).untold() };
+    let found = curves(&series, &settings, measures, &runs, &beside);
     let about = About {
         stage: "render",
         subject: format!("{}, {width}×{height}", stage.spec.name),
@@ -173,10 +193,26 @@ pub fn sweep(
             "--size",
             &format!("{width}x{height}"),
         ])],
-        reference: vec![truth.said(half, smallest)],
-        notes: notes(what, &runs.trials, truth.untold()),
+        reference: judges.said(half, smallest(&settings, &runs)),
+        notes: notes(what, &runs.trials, judges.untold()),
     };
-    Ok(about.sweep(MEASURES.to_vec(), found, effort, runs.ended, began))
+    Ok(about.sweep(measures.to_vec(), found, effort, runs.ended, began))
+}
+
+/// The most samples of a pixel that are tried.
+fn most(what: &RenderSweep) -> u32 {
+    what.samples.iter().copied().max().unwrap_or(FEW)
+}
+
+/// What is measured of the settings.
+fn measures(what: &RenderSweep) -> &'static [Measure] {
+    if what.tables.is_empty() { &MEASURES[..4] } else { &MEASURES }
+}
+
+/// The smallest error that was told of the material itself.
+fn smallest(settings: &[Setting<Shot>], runs: &Runs) -> f64 {
+    let own = settings.iter().zip(&runs.trials).filter(|(setting, _)| setting.what.table.is_none());
+    own.flat_map(|(_, trials)| trials).map(|t| t.errors[0]).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min)
 }
 
 /// Refuses sums of pictures, one a setting, that take more than [`ROOM`].
@@ -200,8 +236,19 @@ fn notes(what: &RenderSweep, trials: &[Vec<Trial>], untold: f64) -> Vec<String> 
         "independent samples are means of pictures of {FEW} Sobol' points a pixel, each with a seed of its own: of more \
          samples as many whole pictures as hold them, and {FEW} or less take no part in slopes"
     );
-    let said = [(close > 0, unjudged), (what.ways.contains(&Way::Independent), blocks)];
+    let ends = "a table ends below 90°, and what it does not hold is black: that is what `unmeasured` says, and other errors of \
+                tables are against the material without it. The ideal instrument takes a second for each pair of directions"
+        .to_owned();
+    let said =
+        [(close > 0, unjudged), (what.ways.contains(&Way::Independent), blocks), (!what.tables.is_empty(), ends)];
     said.into_iter().filter_map(|(is_so, note)| is_so.then_some(note)).collect()
+}
+
+/// One of each way, then one of each table.
+fn scenes(stage: &Stage, subject: Option<&Material>, what: &RenderSweep) -> Result<Vec<Scene>, ChainError> {
+    let of_ways = what.ways.iter().map(|way| scene(stage, subject, *way));
+    let of_tables = what.tables.all.iter().map(|table| chain::scene(stage, Some(table.material.clone())));
+    of_ways.chain(of_tables).collect()
 }
 
 fn scene(stage: &Stage, subject: Option<&Material>, way: Way) -> Result<Scene, ChainError> {
@@ -225,27 +272,54 @@ fn design(what: &RenderSweep) -> (Vec<Series>, Vec<Setting<Shot>>) {
         whole: 0.0,
         advisable: way == Way::Scene,
     };
-    for (way, kind) in what.ways.iter().enumerate() {
-        let of_error = Some(kind.law()).filter(|_| kind.is_unbiased());
-        series.push(new(kind.name(), Knob::Samples, vec![of_error, Some(kind.law()), None, None], *kind));
+    for (scene, &way) in what.ways.iter().enumerate() {
+        let of_error = Some(way.law()).filter(|_| way.is_unbiased());
+        series.push(new(way.name(), Knob::Samples, vec![of_error, Some(way.law()), None, None, None], way));
         for &samples in &what.samples {
             let size = f64::from(samples);
             let text = Knob::Samples.typed(size, 0.0);
-            let setting = Setting::sized(series.len() - 1, size, text, Shot { way, samples, target: None });
-            settings.push(Setting { effective: kind.effective(samples), ..setting });
+            let shot = Shot { way, scene, table: None, samples, target: None };
+            let setting = Setting::sized(series.len() - 1, size, text, shot);
+            settings.push(Setting { effective: way.effective(samples), ..setting });
         }
     }
     // As `render` does it, by the scene's plan, where that is among the ways.
-    let way = what.ways.iter().position(|way| *way == Way::Scene).unwrap_or(0);
+    let scene = what.ways.iter().position(|way| *way == Way::Scene).unwrap_or(0);
     if !what.targets.is_empty() {
-        series.push(new("samples where it is noisy".into(), Knob::PictureTarget, vec![None; 4], what.ways[way]));
+        series.push(new("samples where it is noisy".into(), Knob::PictureTarget, vec![None; 5], what.ways[scene]));
     }
     for &target in &what.targets {
-        let shot = Shot { way, samples: 1 << 24, target: Some(target) };
+        let shot = Shot { way: what.ways[scene], scene, table: None, samples: 1 << 24, target: Some(target) };
         let text = Knob::PictureTarget.typed(target, 0.0);
         settings.push(Setting { promise: Some(target), ..Setting::sized(series.len() - 1, target, text, shot) });
     }
+    add_tables(what, &mut series, &mut settings);
     (series, settings)
+}
+
+/// The series of tables: what a finer one takes is the instrument's time, and what it brings is less bias. No one command makes
+/// its pictures, and so advice takes none of them.
+fn add_tables(what: &RenderSweep, series: &mut Vec<Series>, settings: &mut Vec<Setting<Shot>>) {
+    if what.tables.is_empty() {
+        return;
+    }
+    series.push(Series {
+        name: "resolution of the table".into(),
+        knob: Knob::Resolution,
+        cost: Cost::Instrument,
+        main: BIAS,
+        laws: vec![None, None, what.tables.law, None, None],
+        whole: 0.0,
+        advisable: false,
+    });
+    let samples = most(what);
+    for (k, table) in what.tables.all.iter().enumerate() {
+        let shot = Shot { way: Way::Scene, scene: what.ways.len() + k, table: Some(k), samples, target: None };
+        let text =
+            [Knob::Resolution.typed(table.step_deg, 0.0), Knob::Samples.typed(f64::from(samples), 0.0)].join(" ");
+        let setting = Setting::sized(series.len() - 1, table.step_deg, text, shot);
+        settings.push(Setting { instrument_s: Some(table.instrument_s), ..setting });
+    }
 }
 
 /// A picture and the time of its rendering, s.
@@ -279,11 +353,14 @@ fn picture(scene: &Scene, way: Way, options: &Options, control: Control<'_>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::{BuiltInMaterial, Source};
 
     #[test]
     fn independent_samples_are_counted_in_blocks() {
         let ways = vec![Way::Scene, Way::Independent];
-        let what = RenderSweep { size: (8, 8), samples: vec![4, 8, 12, 16], targets: vec![], ways, reference: None };
+        let tables = Tables::default();
+        let what =
+            RenderSweep { size: (8, 8), samples: vec![4, 8, 12, 16], targets: vec![], ways, reference: None, tables };
         let (_, settings) = design(&what);
         let found: Vec<Option<f64>> = settings.iter().map(|s| s.effective).collect();
         let none = f64::INFINITY;
@@ -291,6 +368,30 @@ mod tests {
         assert_eq!(found[4..], [none, none, 16.0, 16.0].map(Some));
         assert!(notes(&what, &[], 0.0).concat().contains("pictures of 8 Sobol' points"));
         assert!(notes(&RenderSweep { ways: vec![Way::Scene], ..what }, &[], 0.0).is_empty());
+    }
+
+    #[test]
+    fn tables_are_rendered_at_the_most_samples_and_no_advice() {
+        let satin = Source::Fitted(Box::new(BuiltInMaterial::find("satin").expect("built in").material()));
+        let own = chain::render_material("satin", &satin, None).expect("renders");
+        let control = Control::silent();
+        let tables = Tables::read(("satin", &satin), &own, None, &[30.0, 15.0], control).expect("reads");
+        let ways = vec![Way::Full];
+        let what =
+            RenderSweep { size: (8, 8), samples: vec![4, 16], targets: vec![0.1], ways, reference: None, tables };
+        let (series, settings) = design(&what);
+        let last = &series[2];
+        assert!(last.knob == Knob::Resolution && last.main == BIAS && !last.advisable, "{last:?}");
+        let of_tables: Vec<(&str, usize, Option<usize>, Option<f64>)> =
+            settings[3..].iter().map(|s| (s.text.as_str(), s.what.scene, s.what.table, s.size)).collect();
+        let want = [
+            ("--scan hemisphere:30 --samples 16", 1, Some(0), Some(30.0)),
+            ("--scan hemisphere:15 --samples 16", 2, Some(1), Some(15.0)),
+        ];
+        assert_eq!(of_tables, want);
+        let names = |what: &RenderSweep| measures(what).iter().map(|m| m.name).collect::<Vec<_>>();
+        assert_eq!(names(&what), ["error", "noise", "bias", "flip", "unmeasured"]);
+        assert_eq!(names(&RenderSweep { tables: Tables::default(), ..what })[..], ["error", "noise", "bias", "flip"]);
     }
 
     #[test]
