@@ -21,7 +21,7 @@ run fit-losses fit "$gold" --losses cosine-l2,l2,log,cuberoot,relative --parts 1
 run render-demo render --scene sphere-on-plane --material glossy-paint --samples 4,8,16,32,64,128,256,512 --targets 10%,5%,2%,1%
 run render-merl render --scene sphere-on-plane --material "$gold" --samples 4,8,16,32,64,128,256,512
 run render-cornell render --scene cornell --depths 1,3 --targets 20%,10%,5%
-run render-resolution render --scene sphere-on-plane --material satin --ways scene --samples 256 --resolutions 15,10,7.5,5,3
+run render-resolution render --scene sphere --material satin --ways scene --samples 512 --resolutions 15,10,7.5,5
 run simulate-plain simulate --material glossy-paint --scan hemisphere:10 --knobs readings,exposure,step --trials 16
 run quadrature simulate --material "$gold" --instrument commercial --scan in-plane:15 --knobs quadrature --target-errors 0.3,0.1,1e-2,1e-3,1e-4,1e-5,1e-6,1e-7 --trials 3
 run order simulate --material "$gold" --instrument commercial --scan in-plane:30 --knobs order --trials 2

@@ -265,6 +265,7 @@ fn value(m: &Measurement, o: &FitOptions, channel: usize, entry: usize) -> Optio
     let mut w = if solid_angle { m.weights.get(entry) } else { 1.0 };
     if o.use_sigma {
         let sigma = m.sigma_plane(channel).expect("a stated sigma")[entry];
+        let shared = (0..m.common.len()).map(|k| m.common_plane(k, channel)[entry].powi(2)).sum::<f64>();
         let c = wi.z;
         let to = match o.loss {
             Loss::L2 => 1.0,
@@ -273,7 +274,7 @@ fn value(m: &Measurement, o: &FitOptions, channel: usize, entry: usize) -> Optio
             Loss::CubeRoot => c.cbrt() / (3.0 * y.cbrt().powi(2)),
             Loss::Relative => 1.0 / (y.abs() + plain_epsilon(m, channel)),
         };
-        w = (to * sigma).powi(-2);
+        w = (to * to * (sigma * sigma + shared)).recip();
     }
     (w > 0.0).then(|| Value { entry, channel, cos_i: wi.z, cos_alpha: cos_alpha(wi, wo), y, w })
 }
