@@ -36,6 +36,7 @@ fn row((stage, wish, run): &Row) -> bool {
 fn main() {
     let names: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let is_asked = |row: &&Row| names.is_empty() || names.iter().any(|name| row.0.starts_with(name.as_str()));
+    assert!(ROWS.iter().chain(&TIMES).any(|of| is_asked(&of)), "no row's name begins with one of {names:?}");
     println!("| stage | wished, with 95 % confidence | trials | met | advised, mean size | time of all |");
     println!("|---|---|---|---|---|---|");
     let kept = ROWS.iter().filter(is_asked).filter(|of| row(of)).count();

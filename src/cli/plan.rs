@@ -144,7 +144,7 @@ fn brief(e: f64) -> String {
 struct Row {
     name: String,
     precision: Precision,
-    /// In [`Table::hours`], and in as many as the plan takes; less than the scan takes once mean nothing.
+    /// In [`Table::hours`], and in as many as the plan takes; fewer hours than the scan takes once have no meaning.
     in_hours: Vec<Precision>,
     /// Share of the best information a second.
     efficiency: f64,
@@ -240,7 +240,7 @@ impl Table {
         let blocks: Vec<String> = names.chunks(ABREAST).map(|of| self.errors(of)).collect();
         text.push_str(&blocks.join("\n"));
         text.push_str(&self.against_hours());
-        let below = "Relative standard errors, % (median over the prior, 90 % quantile), one channel, by readings' noise and what they \
+        let below = "Relative standard errors of a fit with --use-sigma, % (median over the prior, 90 % quantile), one channel, by readings' noise and what they \
              share: positions and the certificate. Against hours stand the medians alone: of plans made for less than the budget, else of the same stops \
              read for so long. Efficiency: the share of the best information an hour by noise alone.";
         text.push_str(&wrapped(below, COLUMNS).join("\n"));
@@ -297,7 +297,9 @@ impl Table {
         // A scan that takes longer once can't be read in the plan's hours.
         let hours = self.scans[0].precision.hours;
         for row in self.scans[1..].iter().filter(|row| row.precision.hours <= hours) {
-            text.extend(row.in_hours.last().map(|of_plan| row.line(of_plan, of) + "\n"));
+            if let Some(in_the_plans_hours) = row.in_hours.last() {
+                let _ = writeln!(text, "{}", row.line(in_the_plans_hours, of));
+            }
         }
         text
     }

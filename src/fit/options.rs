@@ -48,7 +48,7 @@ pub struct FitOptions {
     pub loss: Loss,
     /// The weights.
     pub weights: WeightMode,
-    /// Weigh by 1/σ_r² instead, by all of the error that the measurement states of a value, its own and what it shares; no solid angle then.
+    /// Weigh by 1/((∂r/∂y)² (σ² + Σ u²)) instead, by all of the error that the measurement states of a value, its own σ and the u that it shares; no solid angle then.
     pub use_sigma: bool,
     /// Lets outliers count less.
     pub robust: Option<Robust>,

@@ -75,7 +75,7 @@ fn a_plan_knows_jitter_and_saturation() {
 }
 
 /// Zeros, tilt and a certificate that readings share: the plan's stated errors are those of redrawn instruments, and it is no worse than the usual scan
-/// in the same hours.
+/// in the same hours by more than chance may make it (4 σ).
 #[test]
 fn a_plan_knows_what_readings_share() {
     let base = moving();

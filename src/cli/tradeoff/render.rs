@@ -53,8 +53,8 @@ pub(super) struct Args {
     /// Scattering events of a path at most, to try beside the scene's
     #[arg(long, value_delimiter = ',', value_name = "N,N,…", value_parser = clap::value_parser!(u32).range(0..=1000))]
     depths: Vec<u32>,
-    /// How finely the material is measured, to try: steps in degrees (0.1 to 45) of the scan `hemisphere:STEP` by the ideal instrument, whose table is
-    /// rendered in the material's place at the most samples. A setting is of two commands, which the result names; advice takes none of them
+    /// Steps (degrees, 0.1 to 45) of scans `hemisphere:STEP` to try: the ideal instrument reads the material along each, and the table is rendered in
+    /// its place at the most samples, against a reference of its own. A setting is of two commands, which the result names; advice takes none of them
     #[arg(long, value_delimiter = ',', value_name = "STEP,STEP,…", requires = "material", value_parser = parse_step)]
     resolutions: Vec<f64>,
     /// Samples per pixel of each of the reference's two pictures [default: 4 times the most]

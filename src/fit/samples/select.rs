@@ -147,13 +147,12 @@ impl Judge<'_> {
         any
     }
 
-    /// 1/σ_r² with σ_r = |∂r/∂y| times all of the value's error, its own σ and what it shares with others, at f = y; 0 where its own is no positive
-    /// number.
+    /// 1/((∂r/∂y)² (σ² + Σ u²)) at f = y, by all of the value's error, its own and what it shares with others; 0 where its own is no positive number.
     fn inverse_variance(&self, entry: usize, channel: usize, datum: Datum) -> f64 {
         let measurement = self.samples.measurement;
         let sigma = measurement.sigma_plane(channel).map_or(f64::NAN, |s| s[entry]);
-        let common = (0..measurement.common.len()).map(|k| measurement.common_plane(k, channel)[entry].powi(2));
-        let variance = sigma * sigma + common.filter(|v| v.is_finite()).sum::<f64>();
+        let shared = (0..measurement.common.len()).map(|k| measurement.common_plane(k, channel)[entry].powi(2));
+        let variance = sigma * sigma + shared.sum::<f64>();
         let slope = self.samples.loss.data_slope(datum.value, datum);
         let weight = (variance * slope * slope).recip();
         if sigma > 0.0 && weight > 0.0 && weight.is_finite() { weight } else { 0.0 }

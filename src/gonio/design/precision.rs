@@ -25,7 +25,7 @@ pub struct Precision {
     pub stops: usize,
     /// Readings, repeats of the instrument's own not counted.
     pub rows: usize,
-    /// Relative standard errors, parameter by parameter, at the 10 %, 50 % and 90 % quantiles of the prior: by readings' own noise and by what they
+    /// Relative standard errors of a fit that weighs by all stated errors, parameter by parameter, at the 10 %, 50 % and 90 % quantiles of the prior: by readings' own noise and by what they
     /// share, errors of positions and the certificate. Infinite where the scan does not tell the parameter.
     pub errors: Vec<[f64; 3]>,
     /// Mean over the prior of ln det of the information of the noise on ln(parameter); −∞ where the scan leaves a parameter open anywhere in the prior.
@@ -34,7 +34,7 @@ pub struct Precision {
     pub(super) mean_ln_sure: f64,
 }
 
-/// What a scan tells at one draw of the prior. A fit weighs readings by all of their errors.
+/// What a scan tells at one draw of the prior. A fit by stated errors (`use_sigma`) weighs readings by all of them.
 #[derive(Debug, Clone)]
 struct Told {
     /// Information of the noise, parameters by parameters.
@@ -56,7 +56,8 @@ pub fn precision(prior: &Prior, instrument: &Instrument, directions: &Directions
     precisions(prior, instrument, (directions, rows), &[]).0
 }
 
-/// The same, and of that scan read so often that it takes each of these hours: what readings share stays.
+/// The same, and of that scan read so often that it takes each of these hours. Errors that are shared are as large as before; weights change. Rows must
+/// not be none, nor take no time.
 #[must_use]
 pub fn precisions(
     prior: &Prior,
@@ -87,7 +88,9 @@ impl Precision {
         let covariances: Vec<Option<DMatrix<f64>>> = told.iter().map(|of| of.covariance()).collect();
         let parameters = told.first().map_or(0, |of| of.own.nrows());
         let quantiles = |a: usize| {
-            let error = |of: &Option<DMatrix<f64>>| of.as_ref().map_or(f64::INFINITY, |of| of[(a, a)].sqrt());
+            // Rounding may leave nothing of a variance where A is nearly singular.
+            let variance = |of: &DMatrix<f64>| Some(of[(a, a)]).filter(|v| *v > 0.0);
+            let error = |of: &Option<DMatrix<f64>>| of.as_ref().and_then(variance).map_or(f64::INFINITY, f64::sqrt);
             let mut list: Vec<f64> = covariances.iter().map(error).collect();
             list.sort_by(f64::total_cmp);
             QUANTILES.map(|q| list[(q * (list.len() - 1) as f64).round() as usize])
@@ -188,10 +191,10 @@ impl Told {
         &self.spread + &self.shared * self.shared.transpose()
     }
 
-    /// Minus ln det of the covariance; −∞ where A is singular.
+    /// Minus ln det of the covariance; −∞ where A is singular, or B + G Gᵀ to rounding.
     fn ln_sure(&self) -> f64 {
-        let normal = ln_det(&self.normal);
-        if normal == f64::NEG_INFINITY { normal } else { 2.0 * normal - ln_det(&self.scatter()) }
+        let (normal, scatter) = (ln_det(&self.normal), ln_det(&self.scatter()));
+        if scatter == f64::NEG_INFINITY { scatter } else { 2.0 * normal - scatter }
     }
 }
 
@@ -199,6 +202,38 @@ impl Told {
 mod tests {
     use super::*;
     use crate::geometry::angles::direction_deg;
+
+    /// By hand, of one parameter with g = 2 and two readings: own variances 0.01 and 0.04, one shared error of 0.1 and 0.3 besides one of the first alone, 0.2.
+    #[test]
+    fn covariance_is_that_of_a_fit_that_weighs_all_errors() {
+        let mut told = Told::new(1, 2);
+        told.add(&[2.0], 0.01, &[0.1, 0.2]);
+        told.add(&[2.0], 0.04, &[0.3, 0.0]);
+        let w = [1.0 / (0.01 + 0.01 + 0.04), 1.0 / (0.04 + 0.09)];
+        let a = 4.0 * (w[0] + w[1]);
+        let own = 4.0 * (w[0] * w[0] * 0.01 + w[1] * w[1] * 0.04);
+        let shared = 4.0 * ((w[0] * 0.1 + w[1] * 0.3).powi(2) + (w[0] * 0.2).powi(2));
+        let want = (own + shared) / (a * a);
+        let got = told.covariance().expect("determined")[(0, 0)];
+        assert!((got / want - 1.0).abs() < 1e-14, "{got} {want}");
+        assert!((told.ln_sure() + want.ln()).abs() < 1e-12);
+        assert!((ln_det(&told.own) - (4.0f64 * (100.0 + 25.0)).ln()).abs() < 1e-12);
+        assert!(Told::new(1, 2).covariance().is_none() && Told::new(1, 2).ln_sure() == f64::NEG_INFINITY);
+    }
+
+    /// Read four times as often: a fourth of the noise's variance, and of a certificate's error all of it.
+    #[test]
+    fn more_hours_lessen_the_noise_and_not_the_certificate() {
+        let prior = Prior::usual(&"lambert".parse().expect("a model")).expect("space");
+        let mut instrument = Instrument::default();
+        instrument.reference.reflectance_u = 0.01;
+        let directions = Directions::List { wi: vec![direction_deg(20.0, 180.0)], wo: vec![direction_deg(60.0, 0.0)] };
+        let hours = precision(&prior, &instrument, &directions, &[0; 25]).hours;
+        let (once, more) = precisions(&prior, &instrument, (&directions, &[0; 25]), &[hours, 4.0 * hours]);
+        let noise = |of: &Precision| of.errors[0][1].powi(2) - 1e-4;
+        assert_eq!(more[0].errors, once.errors);
+        assert!((4.0 * noise(&more[1]) / noise(&once) - 1.0).abs() < 1e-6, "{once:?} {more:?}");
+    }
 
     /// A diffuse material: σ of the weight is that of the mean of its readings.
     #[test]

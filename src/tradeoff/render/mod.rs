@@ -140,7 +140,7 @@ pub fn sweep(
 ) -> Result<Sweep, ChainError> {
     let began = Instant::now();
     let (series, settings) = design(what);
-    within_memory(settings.len(), what.size)?;
+    within_memory(settings.len() + what.tables.all.len(), what.size)?;
     what.tables.check(stage)?;
     let scenes = scenes(stage, subject, what)?;
     let (width, height) = what.size;
@@ -194,7 +194,7 @@ pub fn sweep(
             &format!("{width}x{height}"),
         ])],
         reference: judges.said(half, smallest(&settings, &runs)),
-        notes: notes(what, &runs.trials, judges.untold()),
+        notes: notes(what, &runs.trials, judges.of(None).untold()),
     };
     Ok(about.sweep(measures.to_vec(), found, effort, runs.ended, began))
 }

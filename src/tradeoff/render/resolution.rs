@@ -38,11 +38,11 @@ pub(super) struct Table {
 }
 
 /// A Gaussian lobe exp(−n x²/2) whose values in steps of h are joined by straight lines has, on average over where those stand,
-/// the squared error Σ (−a)ᵏ/k!·(1/3 − 4/((2k + 1)(2k + 2))) times its square, a = n h²/4, both integrated. Its root goes as h²
+/// the squared error Σ_{k≥2} (−a)ᵏ/k!·(1/3 − 4/((2k + 1)(2k + 2))) times its square, a = n h²/4, both integrated. Its root goes as h²
 /// where a is small, and as h to the power 1.74 at n h² = 2.6, from which on a step is no finer than a lobe.
 const SMOOTH: Law = Law {
     theory: Theory::Between(2.0, 1.7),
-    why: "straight lines between values are off by the square of the step, by less where a lobe is hardly wider than it",
+    why: "straight lines between values are off by the square of the step, by a lower power where a lobe is hardly wider than it",
 };
 const NARROW: Law = Law {
     theory: Theory::Unknown,
@@ -147,6 +147,7 @@ fn within(truth: &Material, table: &Material) -> Material {
         (Material::Brdf(truth), Material::Brdf(table)) => {
             Material::Brdf(Arc::new(Within { truth: Arc::clone(truth), table: Arc::clone(table) }))
         }
+        // Neither is anything else: both were made to be rendered as measurements or fits.
         _ => truth.clone(),
     }
 }
