@@ -39,9 +39,9 @@ fn main() {
     assert!(ROWS.iter().chain(&TIMES).any(|of| is_asked(&of)), "no row's name begins with one of {names:?}");
     println!("| stage | wished, with 95 % confidence | trials | met | advised, mean size | time of all |");
     println!("|---|---|---|---|---|---|");
-    let kept = ROWS.iter().filter(is_asked).filter(|of| row(of)).count();
+    let missed = ROWS.iter().filter(is_asked).filter(|of| !row(of)).count();
     TIMES.iter().filter(is_asked).for_each(|of| _ = row(of));
-    if kept < ROWS.iter().filter(is_asked).count() {
+    if missed > 0 {
         eprintln!("a promise is kept too seldom");
         std::process::exit(1);
     }

@@ -53,6 +53,11 @@ impl Judges {
         self.of_tables.get(table?)?.unmeasured
     }
 
+    /// What an error that could not be told stays below, whatever is judged.
+    pub fn untold(&self) -> f64 {
+        self.of_tables.iter().map(|of| of.truth.untold()).fold(self.own.untold(), f64::max)
+    }
+
     /// What the references are, of so many samples each, and how good; `smallest` is the least error that the first has told.
     pub fn said(&self, samples: u32, smallest: f64) -> Vec<String> {
         let mut said = vec![self.own.said(samples, smallest)];

@@ -194,7 +194,7 @@ pub fn sweep(
             &format!("{width}x{height}"),
         ])],
         reference: judges.said(half, smallest(&settings, &runs)),
-        notes: notes(what, &runs.trials, judges.of(None).untold()),
+        notes: notes(what, &runs.trials, judges.untold()),
     };
     Ok(about.sweep(measures.to_vec(), found, effort, runs.ended, began))
 }
