@@ -1,5 +1,7 @@
 //! What a reading tells: derivatives of the model by its parameters, and the reading's own noise.
 
+use glam::DVec3;
+
 use super::candidates::Pair;
 use super::prior::Prior;
 use crate::brdf::lobe::MAX_PARAMETERS;
@@ -48,6 +50,14 @@ impl Model {
         }
         sum
     }
+
+    /// The model at these parameters, as a reading meets it.
+    pub fn truth<'a>(&'a self, parameters: &'a [f64]) -> impl Fn(DVec3, DVec3, &mut [f64]) -> bool + 'a {
+        |wi, wo, out| {
+            out[0] = self.value(parameters, (wi, wo), &mut [0.0; MOST][..self.parameters]);
+            true
+        }
+    }
 }
 
 /// The noise of readings by an instrument.
@@ -88,11 +98,7 @@ impl<'a> Noise<'a> {
 
     /// Variance of f by where four axes stop, the same for all readings of a stop, as the reduction counts it.
     pub fn jitter(&self, model: &Model, parameters: &[f64], pair: Pair) -> f64 {
-        let truth = |wi, wo, out: &mut [f64]| {
-            out[0] = model.value(parameters, (wi, wo), &mut [0.0; MOST][..model.parameters()]);
-            true
-        };
-        self.stops.variance(pair, &truth)
+        self.stops.variance(pair, &model.truth(parameters))
     }
 }
 

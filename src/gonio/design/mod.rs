@@ -4,9 +4,10 @@
 //! and other scans make the parameters. The one decision to know: what counts is information per second of the instrument, averaged
 //! over the prior (Bayesian D-optimality: Chaloner & Larntz 1989; Fedorov & Leonov 2013, ch. 5 on cost), of one channel, by readings' own noise. What
 //! readings share, positions and the certificate, decides between that scan, the same with each pair's partner across the mirror direction, and an even
-//! one, and is in the errors that are stated.
+//! one, exchanges rows of the surest, and is in the errors that are stated.
 
 mod candidates;
+mod exchange;
 mod information;
 mod optimum;
 mod planner;

@@ -1,6 +1,7 @@
 //! The plan: candidates, their information per second, the best shares of the time, whole readings.
 
 use super::candidates::{self, Pair};
+use super::exchange::{Search, Sites};
 use super::information::{Model, Noise};
 use super::optimum::{Optimum, Table, best};
 use super::precision::{Precision, counts, precision};
@@ -10,6 +11,7 @@ use crate::geometry::angles::{angle_between, phi_of, theta_of};
 use crate::geometry::mirror;
 use crate::gonio::cost::{dwell_s, visit_s};
 use crate::gonio::instrument::Instrument;
+use crate::gonio::reduce::positions::Kept;
 use crate::gonio::scan::Scan;
 use crate::gonio::travel::move_s;
 use crate::measurement::Directions;
@@ -74,7 +76,7 @@ pub fn plan(wish: &Wish<'_>) -> Result<Plan, Wrong> {
         let wish = Wish { instrument, ..wish.clone() };
         scanned = Weighed::new(&wish, &draws)?.scanned(&wish, &draws);
     }
-    let Scanned { directions, rows, precision } = scanned?;
+    let Scanned { directions, rows, precision, .. } = scanned?;
     Ok(Plan {
         precision,
         directions,
@@ -120,7 +122,7 @@ impl Weighed {
         Ok(Self { pairs, usual_s, stops, table, optimum, undetermined })
     }
 
-    /// The surest scan: by noise alone the first is best; by what readings share another may be.
+    /// The surest scan: by noise alone the first is best; by what readings share another may be, and one between.
     fn scanned(&self, wish: &Wish<'_>, draws: &[Vec<f64>]) -> Result<Scanned, Wrong> {
         let (kept, weights) = supported(&self.table, &self.optimum, affordable(wish, self.usual_s));
         let share = |(&x, weight): (&usize, &f64)| Share { weight: *weight, ..self.stops[x] };
@@ -136,13 +138,36 @@ impl Weighed {
                 _ => {}
             }
         }
-        Ok(best)
+        Ok(self.exchanged(best, wish, draws))
+    }
+
+    /// The same scan with rows exchanged where that makes it surer.
+    fn exchanged(&self, scan: Scanned, wish: &Wish<'_>, draws: &[Vec<f64>]) -> Scanned {
+        if Kept::of(wish.instrument).len() == 1 {
+            // The certificate at most, a factor of all readings alike.
+            return scan;
+        }
+        let own = (0..scan.shares.len()).map(|x| (scan.directions.pair(x), scan.shares[x].rows_per_stop));
+        let others = self.pairs.iter().zip(&self.stops).map(|(pair, stop)| (*pair, stop.rows_per_stop));
+        let (pairs, rows_per_stop): (Vec<Pair>, Vec<u32>) = own.chain(others).unzip();
+        let instrument = wish.instrument;
+        let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(instrument.protocol.block);
+        let mut rows = vec![0; pairs.len()];
+        scan.rows.iter().for_each(|&x| rows[x as usize] += 1);
+        let sites = Sites { pairs, rows_per_stop, row_s, move_s: self.usual_s };
+        let rows = Search::new(&sites, wish.prior, instrument, draws).better(rows);
+        match whole(sites.shares(&rows), wish) {
+            Ok(other) if other.sureness() > scan.sureness() => other,
+            _ => scan,
+        }
     }
 }
 
 /// Whole readings.
 struct Scanned {
     directions: Directions,
+    /// Of each pair of `directions`.
+    shares: Vec<Share>,
     rows: Vec<u32>,
     precision: Precision,
 }
@@ -161,7 +186,7 @@ fn whole(mut list: Vec<(Pair, Share)>, wish: &Wish<'_>) -> Result<Scanned, Wrong
     let (wi, wo) = list.iter().map(|c| c.0).unzip();
     let directions = Directions::List { wi, wo };
     let rows = rounding::rows(&shares, &directions, instrument, budget_s)?;
-    Ok(Scanned { precision: precision(prior, instrument, &directions, &rows), directions, rows })
+    Ok(Scanned { precision: precision(prior, instrument, &directions, &rows), directions, shares, rows })
 }
 
 /// Each pair together with that on the other side of the mirror direction, where there is one: what moves a lobe raises the one and lowers the other.

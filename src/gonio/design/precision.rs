@@ -36,15 +36,15 @@ pub struct Precision {
 
 /// What a scan tells at one draw of the prior. A fit by stated errors (`use_sigma`) weighs readings by all of them.
 #[derive(Debug, Clone)]
-struct Told {
+pub(super) struct Told {
     /// Information of the noise, parameters by parameters.
     own: DMatrix<f64>,
     /// A: the same by the fit's weights.
-    normal: DMatrix<f64>,
+    pub normal: DMatrix<f64>,
     /// What the noise adds to the scatter of the fit's normal equations.
     spread: DMatrix<f64>,
     /// What each shared error of 1 σ does to them: parameters by errors.
-    shared: DMatrix<f64>,
+    pub shared: DMatrix<f64>,
 }
 
 /// Quantiles of the prior that errors are given at.
@@ -136,10 +136,7 @@ fn at(
     let p = model.parameters();
     let mut told = vec![Told::new(p, kept.len()); times.len()];
     let mut gradient = vec![0.0; p];
-    let truth = |wi, wo, out: &mut [f64]| {
-        out[0] = model.value(draw, (wi, wo), &mut vec![0.0; p]);
-        true
-    };
+    let truth = model.truth(draw);
     for (pair, stops) in pairs {
         let f = model.value(draw, *pair, &mut gradient);
         let Some(own) = noise.variance(f, *pair) else { continue };
@@ -152,7 +149,7 @@ fn at(
 }
 
 impl Told {
-    fn new(parameters: usize, shared: usize) -> Self {
+    pub fn new(parameters: usize, shared: usize) -> Self {
         let nothing = DMatrix::zeros(parameters, parameters);
         Self {
             own: nothing.clone(),
@@ -163,7 +160,7 @@ impl Told {
     }
 
     /// Adds a reading of this variance of its own, and these errors that it shares.
-    fn add(&mut self, gradient: &[f64], own: f64, shared: &[f64]) {
+    pub fn add(&mut self, gradient: &[f64], own: f64, shared: &[f64]) {
         let weight = 1.0 / (own + shared.iter().map(|u| u * u).sum::<f64>());
         let g = DVector::from_column_slice(gradient);
         self.own.ger(1.0 / own, &g, &g, 1.0);
@@ -187,12 +184,12 @@ impl Told {
     }
 
     /// B + G Gᵀ.
-    fn scatter(&self) -> DMatrix<f64> {
+    pub fn scatter(&self) -> DMatrix<f64> {
         &self.spread + &self.shared * self.shared.transpose()
     }
 
     /// Minus ln det of the covariance; −∞ where A is singular, or B + G Gᵀ to rounding.
-    fn ln_sure(&self) -> f64 {
+    pub fn ln_sure(&self) -> f64 {
         let (normal, scatter) = (ln_det(&self.normal), ln_det(&self.scatter()));
         if scatter == f64::NEG_INFINITY { scatter } else { 2.0 * normal - scatter }
     }
