@@ -3,7 +3,7 @@
 //! What readings share makes no concave function of the shares of the time, so no theorem tells how far the best still is: this is a local search,
 //! in whole rows, that adds where a second gains most and drops where one loses least (exchanges: Fedorov 1972; adding before dropping: Mitchell 1974).
 
-use nalgebra::{Cholesky, DMatrix, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVectorView, Dyn};
 use rayon::prelude::*;
 
 use super::candidates::Pair;
@@ -88,7 +88,8 @@ pub(super) struct Search<'a> {
 struct State {
     normal: DMatrix<f64>,
     scatter: DMatrix<f64>,
-    shared: DMatrix<f64>,
+    /// Row by row.
+    shared: Vec<f64>,
     ln_sure: f64,
 }
 
@@ -169,7 +170,13 @@ impl<'a> Search<'a> {
     fn gains(&self, at: &At, changes: &[Change]) -> Vec<f64> {
         let of = |(draw, state): (&Draw, &State)| -> Vec<f64> {
             let weighed = |x: usize, n: u32| draw.weighed(self.sites, x, n);
-            changes.iter().map(|&(x, n)| draw.gain(state, x, weighed(x, at.rows[x]), weighed(x, n))).collect()
+            // Changes of one pair come one after the other.
+            let of_pair = |changes: &[Change]| -> Vec<f64> {
+                let x = changes[0].0;
+                let (forms, before) = (draw.forms(state, x), weighed(x, at.rows[x]));
+                changes.iter().map(|&(x, n)| forms.gain(before, weighed(x, n))).collect()
+            };
+            changes.chunk_by(|a, b| a.0 == b.0).flat_map(of_pair).collect()
         };
         let each: Vec<Vec<f64>> = self.draws.par_iter().zip(&at.states).map(of).collect();
         let mean = |i: usize| each.iter().map(|list| list[i]).sum::<f64>() / each.len() as f64;
@@ -254,19 +261,46 @@ impl Draw {
         }
         let ln_sure = told.ln_sure();
         let (normal, scatter) = (inverse(&told.normal)?, inverse(&told.scatter())?);
-        ln_sure.is_finite().then_some(State { normal, scatter, shared: told.shared, ln_sure })
+        ln_sure.is_finite().then_some(State {
+            normal,
+            scatter,
+            shared: told.shared.transpose().as_slice().to_vec(),
+            ln_sure,
+        })
     }
 
-    /// What it adds to minus ln det of the covariance, 2 ln det A - ln det S, to weigh a pair otherwise: A gains δa g gᵀ; S, the noise's part and G Gᵀ,
-    /// gains α g gᵀ + δa (g qᵀ + q gᵀ) with q = G u and α = δb + δa² |u|².
-    fn gain(&self, state: &State, x: usize, (a, b): (f64, f64), (new_a, new_b): (f64, f64)) -> f64 {
+    fn forms(&self, state: &State, x: usize) -> Forms {
         let Reading { gradient: g, shared: u, square, .. } = &self.readings[x];
+        let q: Vec<f64> = state.shared.chunks_exact(u.len()).map(|row| dot(row, u)).collect();
+        let scatter = |a: &[f64], b: &[f64]| form(&state.scatter, a, b);
+        Forms {
+            normal: form(&state.normal, g, g),
+            square: *square,
+            gg: scatter(g, g),
+            gq: scatter(g, &q),
+            qq: scatter(&q, &q),
+        }
+    }
+}
+
+/// What a pair's derivatives g and shared errors u are in the inverses of A, the normal equations' matrix, and of S, their scatter: gᵀA⁻¹g, uᵀu, and by
+/// S⁻¹ the products of g and q = G u.
+struct Forms {
+    normal: f64,
+    square: f64,
+    gg: f64,
+    gq: f64,
+    qq: f64,
+}
+
+impl Forms {
+    /// What it adds to minus ln det of the covariance, 2 ln det A - ln det S, to weigh the pair otherwise: A gains δa g gᵀ; S, the noise's part and G Gᵀ,
+    /// gains α g gᵀ + δa (g qᵀ + q gᵀ) with α = δb + δa² uᵀu.
+    fn gain(&self, (a, b): (f64, f64), (new_a, new_b): (f64, f64)) -> f64 {
         let (da, db) = (new_a - a, new_b - b);
-        let alpha = db + da * da * square;
-        let row = |i: usize| u.iter().enumerate().map(|(k, u)| state.shared[(i, k)] * u).sum();
-        let q: Vec<f64> = (0..g.len()).map(row).collect();
-        let normal = 1.0 + da * form(&state.normal, g, g);
-        let (gg, gq, qq) = (form(&state.scatter, g, g), form(&state.scatter, g, &q), form(&state.scatter, &q, &q));
+        let alpha = db + da * da * self.square;
+        let Self { gg, gq, qq, .. } = *self;
+        let normal = 1.0 + da * self.normal;
         // det(1 + M W) of M = [[α, δa], [δa, 0]] and W = [[gg, gq], [gq, qq]].
         let scatter = (1.0 + alpha * gg + da * gq) * (1.0 + da * gq) - da * gg * (alpha * gq + da * qq);
         if normal > 0.0 && scatter > 0.0 { 2.0 * normal.ln() - scatter.ln() } else { f64::NEG_INFINITY }
@@ -280,10 +314,13 @@ impl Reading {
     }
 }
 
-/// xᵀ M y.
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    DVectorView::from_slice(x, x.len()).dot(&DVectorView::from_slice(y, y.len()))
+}
+
+/// xᵀ M y of a symmetric matrix.
 fn form(m: &DMatrix<f64>, x: &[f64], y: &[f64]) -> f64 {
-    let row = |i: usize| y.iter().enumerate().map(|(j, y)| m[(j, i)] * y).sum::<f64>();
-    x.iter().enumerate().map(|(i, x)| x * row(i)).sum()
+    m.as_slice().chunks_exact(y.len()).zip(x).map(|(row, x)| x * dot(row, y)).sum()
 }
 
 /// The inverse of a positive matrix, scaled to a diagonal of ones in between.
