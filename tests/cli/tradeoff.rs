@@ -73,6 +73,7 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
         assert!(!b.bytes(&format!("t/{name}")).is_empty(), "{name}");
     }
     assert_eq!(timeless(&b.json_file("t/tradeoff.json")), timeless(&found));
+    rings_are_the_front_and_points_say_what_they_are(&b.text("t/excess-time.svg"), &found);
     let again = b.json(&["plot", "tradeoff", "t/tradeoff.json", "--only", "parameters-part", "--out", "p.svg"]);
     assert!(b.text("p.svg") == b.text("t/parameters-part.svg"), "the file holds all that the plot shows");
     let drawn = &again["plots"][0]["curves"][0];
@@ -98,6 +99,24 @@ fn a_fit_to_a_part_is_off_as_theory_says_and_the_files_say_what_was_printed() {
     let text = b.ok(&[&args[..], &["--advise", "excess=20%"]].concat()).text();
     assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
     assert!(text.contains("goniofit fit paint.csv --model lambert+phong --loss cosine-l2 --part"), "{text}");
+}
+
+/// Of settings that have an error at all.
+fn rings_are_the_front_and_points_say_what_they_are(svg: &str, found: &Value) {
+    let settings: Vec<&Value> =
+        found["curves"].as_array().expect("curves").iter().flat_map(|c| c["points"].as_array().unwrap()).collect();
+    let shown = |p: &&&Value| p["errors"][measure(found, "excess")]["value"].as_f64() > Some(0.0);
+    for (standing, class) in [("front", "ring"), ("undecided", "ring ring-1")] {
+        let want = settings.iter().filter(shown).filter(|p| p["standing"] == standing).count();
+        let drawn = svg.matches(&format!("<circle class=\"{class}\"")).count();
+        // One more is in the legend.
+        assert_eq!(drawn, if want > 0 { want + 1 } else { 0 }, "{standing}: {svg}");
+    }
+    assert!(settings.iter().any(|p| p["standing"] == "front"));
+    for setting in settings.iter().filter(shown) {
+        let title = format!("<title>{}: ", setting["setting"].as_str().expect("a setting"));
+        assert!(svg.contains(&title), "{title} {svg}");
+    }
 }
 
 /// A sweep is of the fit that one makes: by its loss, its weights, its limits, through its instrument.

@@ -107,7 +107,15 @@ fn fits(run: &Run) -> Option<String> {
 
 /// Charts and slopes of a `tradeoff.json`.
 fn sweep(found: &views::Sweep) -> Sweep {
-    let chart = |plot: views::SweepPlot| (format!("{}; bars are 95 % intervals.", plot.shows), plot.figure.inline());
+    let chart = |plot: views::SweepPlot| {
+        (
+            format!(
+                "{}; bars are 95 % intervals, and a point says what it is where a pointer rests on it.",
+                plot.shows
+            ),
+            plot.figure.inline(),
+        )
+    };
     let slopes = found.curves.iter().flat_map(|c| c.slopes.iter().filter_map(|s| slope(&c.name, s)));
     let trials = format!("{} of each setting, seed {}", counted(found.trials.into(), "trial"), found.seed);
     let settings = options_of("settings", &found.commands);

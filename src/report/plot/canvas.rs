@@ -24,6 +24,12 @@ pub(in crate::report) enum Mark {
         y: Px,
         r: Px,
     },
+    /// A circle that says something where a pointer rests on it.
+    Tip {
+        x: Px,
+        y: Px,
+        says: String,
+    },
     Text {
         class: String,
         x: Px,
@@ -129,6 +135,11 @@ impl Canvas {
 
     pub fn circle(&mut self, class: &str, (x, y): (f64, f64), r: f64) {
         self.marks.push(Mark::Circle { class: class.into(), x: Px(x), y: Px(y), r: Px(r) });
+    }
+
+    /// What is said where a pointer rests on a place.
+    pub fn tip(&mut self, (x, y): (f64, f64), says: &str) {
+        self.marks.push(Mark::Tip { x: Px(x), y: Px(y), says: says.into() });
     }
 
     /// `class` carries the anchor: `start`, `middle` or `end`.

@@ -4,7 +4,7 @@ use super::Figure;
 use super::axes::{Area, Axis};
 use super::canvas::{Canvas, line};
 use super::heading::Heading;
-use super::legend::{dot_class, draw_legend, legend_rows, line_class, wrapped};
+use super::legend::{dot_class, draw_legend, legend_rows, line_class, ring_class, wrapped};
 use super::scale::Scale;
 
 /// How a series is drawn.
@@ -17,6 +17,15 @@ pub enum Marks {
     Dots,
     /// Dots on a line.
     Both,
+    /// Rings around points of other series: whole of colour 0, else dashed.
+    Rings,
+}
+
+impl Marks {
+    /// Whether points are joined.
+    pub(in crate::report) fn has_line(self) -> bool {
+        matches!(self, Self::Line | Self::Both)
+    }
 }
 
 /// A point of a series.
@@ -74,6 +83,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Whether error bars are drawn.
     pub bars: bool,
+    /// What is said where a pointer rests on a place.
+    pub tips: Vec<(Point, String)>,
     /// Where the legend stands.
     pub legend: LegendPlace,
     /// Width and height of all, CSS pixels; a legend below comes on top.
@@ -88,6 +99,7 @@ impl Default for Chart {
             y: Axis::new("", Scale::linear(0.0, 1.0)),
             series: Vec::new(),
             bars: true,
+            tips: Vec::new(),
             legend: LegendPlace::Below,
             size: (430.0, 330.0),
         }
@@ -107,6 +119,8 @@ impl Chart {
         area.frame(&mut canvas, (&self.x, (area.width / 64.0) as usize), (&self.y, 6), true);
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, &area, s)));
         draw_legend(&mut canvas, &rows, 10.0, height + 8.0);
+        let tips = self.tips.iter().filter_map(|(point, says)| Some((self.inside(&area, point)?, says)));
+        tips.for_each(|(at, says)| canvas.tip(at, says));
         self.heading
             .figure(canvas)
             .with_data("area", area.data())
@@ -119,14 +133,18 @@ impl Chart {
             let d: String = series.points.iter().filter_map(|p| self.bar(area, p)).collect();
             canvas.path(&format!("error s{}", wrapped(series.color)), d);
         }
-        if series.marks != Marks::Dots {
+        if series.marks.has_line() {
             let pieces = self.pieces(area, &series.points);
             canvas.path(&line_class(series.color), pieces.into_iter().map(line).collect());
         }
-        if series.marks != Marks::Line {
-            for at in series.points.iter().filter_map(|p| self.inside(area, p)) {
-                canvas.circle(&dot_class(series.color), at, if series.points.len() > 60 { 1.8 } else { 2.6 });
+        let places = series.points.iter().filter_map(|p| self.inside(area, p));
+        match series.marks {
+            Marks::Line => {}
+            Marks::Dots | Marks::Both => {
+                let radius = if series.points.len() > 60 { 1.8 } else { 2.6 };
+                places.for_each(|at| canvas.circle(&dot_class(series.color), at, radius));
             }
+            Marks::Rings => places.for_each(|at| canvas.circle(&ring_class(series.color), at, 5.5)),
         }
     }
 

@@ -24,6 +24,11 @@ pub(in crate::report) fn dot_class(color: usize) -> String {
     format!("dot f{}", wrapped(color))
 }
 
+/// The class of a series' rings.
+pub(super) fn ring_class(color: usize) -> String {
+    if color == 0 { "ring".into() } else { "ring ring-1".into() }
+}
+
 /// A name in a legend, with its sample's place in its row.
 pub(in crate::report) type Entry<'a> = (f64, &'a str, Marks, usize);
 
@@ -54,11 +59,14 @@ pub(in crate::report) fn draw_legend(canvas: &mut Canvas, rows: &[Vec<Entry<'_>>
             let y = top + 18.0 * k as f64;
             for &(x, name, marks, color) in row {
                 let x = left + x;
-                if marks != Marks::Dots {
-                    c.segment(&line_class(color), (x, y - 4.0), (x + 24.0, y - 4.0));
+                let (middle, line) = ((x + 12.0, y - 4.0), line_class(color));
+                if marks.has_line() {
+                    c.segment(&line, (x, y - 4.0), (x + 24.0, y - 4.0));
                 }
-                if marks != Marks::Line {
-                    c.circle(&dot_class(color), (x + 12.0, y - 4.0), 3.0);
+                match marks {
+                    Marks::Line => {}
+                    Marks::Dots | Marks::Both => c.circle(&dot_class(color), middle, 3.0),
+                    Marks::Rings => c.circle(&ring_class(color), middle, 5.5),
                 }
                 c.text("", (x + 31.0, y), name);
             }

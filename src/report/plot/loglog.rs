@@ -30,6 +30,8 @@ pub struct LogLog {
     pub series: Vec<Series>,
     /// Reference lines.
     pub slopes: Vec<Slope>,
+    /// What is said where a pointer rests on a place.
+    pub tips: Vec<(Point, String)>,
 }
 
 impl LogLog {
@@ -50,6 +52,7 @@ impl LogLog {
             x: Axis::new(&*self.x_label, x),
             y: Axis::new(&*self.y_label, y),
             series,
+            tips: self.tips.clone(),
             ..Chart::default()
         };
         chart.series.extend(references);

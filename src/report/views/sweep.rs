@@ -6,7 +6,12 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope, minus};
+use crate::report::words::{digits, time as told};
 use crate::tradeoff::Theory;
+
+/// What rings in plots mean.
+const FRONT: [(Standing, &str); 2] =
+    [(Standing::Front, "none is better in both"), (Standing::Undecided, "one is, within the intervals")];
 
 /// What `goniofit tradeoff` measured of a stage, as `tradeoff.json` has it; what is neither drawn nor listed is not read.
 #[derive(Debug, Clone, Deserialize)]
@@ -246,15 +251,28 @@ impl Sweep {
     fn of_time(&self, (cost, main, of_effects): (Cost, &str, bool)) -> Option<SweepPlot> {
         let measure = self.measures.iter().position(|m| m.name == main)?;
         let own = |c: &&SweepCurve| c.cost.axis() == cost && c.main == main && c.is_of_effects() == of_effects;
-        let curves = self.curves.iter().filter(own);
+        let curves = || self.curves.iter().filter(own);
         let time = |p: &Setting| p.time(cost);
-        let series = series(curves.map(|c| (c, c.points(measure, time), of_effects)));
+        let mut series = series(curves().map(|c| (c, c.points(measure, time), of_effects)));
+        for (color, (standing, said)) in FRONT.into_iter().enumerate() {
+            let of = |c: &SweepCurve| {
+                c.places(measure, time).filter(|(s, _)| s.standing == standing).map(|of| of.1).collect::<Vec<_>>()
+            };
+            let points: Vec<Point> = curves().flat_map(of).collect();
+            series.extend((!points.is_empty()).then(|| Series {
+                name: said.into(),
+                marks: Marks::Rings,
+                points,
+                color,
+            }));
+        }
+        let tips = curves().flat_map(|c| c.tips(measure, time)).collect();
         let (whose, name) = match (cost, of_effects) {
             (Cost::Computer, true) => ("the computer", format!("{main}-effects-time")),
             (Cost::Computer, false) => ("the computer", format!("{main}-time")),
             _ => ("the instrument", format!("{main}-instrument-time")),
         };
-        self.chart(name, &format!("time of {whose} [s]"), main, series, Vec::new())
+        self.chart(name, (&format!("time of {whose} [s]"), main), series, Vec::new(), tips)
     }
 
     /// Errors of the curves of a knob against its size, those measures that are `wanted`.
@@ -275,12 +293,20 @@ impl Sweep {
                     }
                 }
             }
-            self.chart(format!("{}-{knob}", measure.name), axis, &measure.name, series, slopes)
+            let tips = curves().flat_map(|c| c.tips(m, |p| p.size)).collect();
+            self.chart(format!("{}-{knob}", measure.name), (axis, &measure.name), series, slopes, tips)
         };
         self.measures.iter().enumerate().filter(|(_, measure)| wanted(&measure.name)).filter_map(of).collect()
     }
 
-    fn chart(&self, name: String, x: &str, y: &str, series: Vec<Series>, slopes: Vec<Slope>) -> Option<SweepPlot> {
+    fn chart(
+        &self,
+        name: String,
+        (x, y): (&str, &str),
+        series: Vec<Series>,
+        slopes: Vec<Slope>,
+        tips: Vec<(Point, String)>,
+    ) -> Option<SweepPlot> {
         if series.iter().all(|s| s.points.len() < 2) {
             return None;
         }
@@ -291,6 +317,7 @@ impl Sweep {
             y_label: y.into(),
             series,
             slopes,
+            tips,
         };
         let shows = format!("{y} against {}", x.trim_end_matches(" [s]"));
         Some(SweepPlot { name, shows, figure: chart.figure(), series: chart.series })
@@ -324,15 +351,30 @@ impl SweepCurve {
         law.map_or_else(Vec::new, |law| law.theory.slopes())
     }
 
-    /// The settings whose error is known to be more than 0.
-    fn points(&self, measure: usize, x: impl Fn(&Setting) -> Option<f64>) -> Vec<Point> {
-        let at = |p: &Setting| {
+    /// The settings whose error is known to be more than 0, and where they stand in a plot.
+    fn places(&self, measure: usize, x: impl Fn(&Setting) -> Option<f64>) -> impl Iterator<Item = (&Setting, Point)> {
+        self.points.iter().filter_map(move |p| {
             let error = p.errors.get(measure).copied().flatten()?;
             let (y, low) = (error.value.filter(|v| *v > 0.0)?, error.low.filter(|v| *v > 0.0)?);
             let bar = error.high.filter(|high| *high > low).map(|high| (low, high));
-            Some(Point { x: x(p)?, y, bar })
+            Some((p, Point { x: x(p)?, y, bar }))
+        })
+    }
+
+    fn points(&self, measure: usize, x: impl Fn(&Setting) -> Option<f64>) -> Vec<Point> {
+        self.places(measure, x).map(|of| of.1).collect()
+    }
+
+    /// What each of its settings is, takes and is off by.
+    fn tips(&self, measure: usize, x: impl Fn(&Setting) -> Option<f64>) -> Vec<(Point, String)> {
+        let tip = |(setting, point): (&Setting, Point)| {
+            let interval = point
+                .bar
+                .map_or_else(String::new, |(low, high)| format!(" ({} to {})", digits(low, 3), digits(high, 3)));
+            let took = setting.time(self.cost).map_or_else(String::new, |s| format!(", {}", told(s)));
+            (point, format!("{}: {}{interval}{took}", setting.typed, digits(point.y, 3)))
         };
-        self.points.iter().filter_map(at).collect()
+        self.places(measure, x).map(tip).collect()
     }
 }
 
