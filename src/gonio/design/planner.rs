@@ -148,7 +148,9 @@ impl Weighed {
             return scan;
         }
         let own = (0..scan.shares.len()).map(|x| (scan.directions.pair(x), scan.shares[x].rows_per_stop));
-        let others = self.pairs.iter().zip(&self.stops).map(|(pair, stop)| (*pair, stop.rows_per_stop));
+        let is_other = |pair: &Pair| (0..scan.directions.len()).all(|x| !same(scan.directions.pair(x), *pair));
+        let others = self.pairs.iter().zip(&self.stops).filter(|(pair, _)| is_other(pair));
+        let others = others.map(|(pair, stop)| (*pair, stop.rows_per_stop));
         let (pairs, rows_per_stop): (Vec<Pair>, Vec<u32>) = own.chain(others).unzip();
         let instrument = wish.instrument;
         let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(instrument.protocol.block);
@@ -182,11 +184,21 @@ impl Scanned {
 fn whole(mut list: Vec<(Pair, Share)>, wish: &Wish<'_>) -> Result<Scanned, Wrong> {
     let Wish { prior, instrument, budget_s } = *wish;
     list.sort_by(|a, b| place(a.0).partial_cmp(&place(b.0)).unwrap_or(std::cmp::Ordering::Equal));
+    list.dedup_by(|again, first| {
+        let same = same(again.0, first.0);
+        first.1.weight += if same { again.1.weight } else { 0.0 };
+        same
+    });
     let shares: Vec<Share> = list.iter().map(|c| c.1).collect();
     let (wi, wo) = list.iter().map(|c| c.0).unzip();
     let directions = Directions::List { wi, wo };
     let rows = rounding::rows(&shares, &directions, instrument, budget_s)?;
     Ok(Scanned { precision: precision(prior, instrument, &directions, &rows), directions, shares, rows })
+}
+
+/// Whether two pairs are one but for rounding.
+fn same(a: Pair, b: Pair) -> bool {
+    angle_between(a.0, b.0) < 1e-6 && angle_between(a.1, b.1) < 1e-6
 }
 
 /// Each pair together with that on the other side of the mirror direction, where there is one: what moves a lobe raises the one and lowers the other.
@@ -196,8 +208,7 @@ fn mirrored(list: &[(Pair, Share)], instrument: &Instrument) -> Vec<(Pair, Share
     for ((wi, wo), share) in list {
         let top = mirror(*wi);
         let other = (2.0 * top.dot(*wo) * top - *wo).normalize();
-        let same = angle_between(other, *wo) < 1e-6;
-        if same || !counts((*wi, other), instrument) {
+        if same((*wi, other), (*wi, *wo)) || !counts((*wi, other), instrument) {
             all.push(((*wi, *wo), *share));
             continue;
         }
