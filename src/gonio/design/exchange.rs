@@ -48,15 +48,14 @@ impl Sites {
 
     /// Shares of the time that so many rows of each are.
     pub fn shares(&self, rows: &[u32]) -> Vec<(Pair, Share)> {
+        let read = || (0..rows.len()).filter(|&x| rows[x] > 0);
+        let row_s = |x: usize| self.row_s + self.move_s / f64::from(self.rows_per_stop[x]);
+        let all_s: f64 = read().map(|x| f64::from(rows[x]) * row_s(x)).sum();
         let of = |x: usize| {
-            let share = Share {
-                weight: f64::from(rows[x]) * self.row_s,
-                row_s: self.row_s,
-                rows_per_stop: self.rows_per_stop[x],
-            };
-            (self.pairs[x], share)
+            let weight = f64::from(rows[x]) * row_s(x) / all_s;
+            (self.pairs[x], Share { weight, row_s: row_s(x), rows_per_stop: self.rows_per_stop[x] })
         };
-        (0..rows.len()).filter(|&x| rows[x] > 0).map(of).collect()
+        read().map(of).collect()
     }
 }
 
