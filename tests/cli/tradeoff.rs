@@ -106,16 +106,18 @@ fn rings_are_the_front_and_points_say_what_they_are(svg: &str, found: &Value) {
     let settings: Vec<&Value> =
         found["curves"].as_array().expect("curves").iter().flat_map(|c| c["points"].as_array().unwrap()).collect();
     let shown = |p: &&&Value| p["errors"][measure(found, "excess")]["value"].as_f64() > Some(0.0);
-    for (standing, class) in [("front", "ring"), ("undecided", "ring ring-1")] {
+    for (standing, class) in [("front", "ring"), ("undecided", "ring dashed")] {
         let want = settings.iter().filter(shown).filter(|p| p["standing"] == standing).count();
         let drawn = svg.matches(&format!("<circle class=\"{class}\"")).count();
         // One more is in the legend.
         assert_eq!(drawn, if want > 0 { want + 1 } else { 0 }, "{standing}: {svg}");
     }
     assert!(settings.iter().any(|p| p["standing"] == "front"));
+    // Rings have no bars of their own.
+    assert_eq!(svg.matches("class=\"error").count(), found["curves"].as_array().expect("curves").len(), "{svg}");
     for setting in settings.iter().filter(shown) {
-        let title = format!("<title>{}: ", setting["setting"].as_str().expect("a setting"));
-        assert!(svg.contains(&title), "{title} {svg}");
+        let title = format!(": {}: ", setting["setting"].as_str().expect("a setting"));
+        assert!(svg.split("<title>").any(|t| t.contains(&title)), "{title} {svg}");
     }
 }
 

@@ -101,21 +101,28 @@ impl<'a> Search<'a> {
 
     /// Rows that are surer and take no longer than `rows` do, or `rows` themselves. Draws that they leave open are not counted.
     pub fn better(&mut self, rows: Vec<u32>) -> Vec<u32> {
-        self.draws.retain(|draw| draw.state(&rows, self.sites).is_some());
+        let states: Vec<Option<State>> = self.draws.par_iter().map(|draw| draw.state(&rows, self.sites)).collect();
+        let mut told = states.iter().map(Option::is_some);
+        self.draws.retain(|_| told.next() == Some(true));
         let budget_s = self.seconds(&rows);
         let mut chunk = ((FIRST * rows.iter().map(|n| f64::from(*n)).sum::<f64>()) as u32).max(1);
-        let Some(mut at) = self.at(rows.clone()).filter(|at| !at.states.is_empty()) else { return rows };
+        let mut at = At { rows, states: states.into_iter().flatten().collect() };
+        if at.states.is_empty() {
+            return at.rows;
+        }
         let mut looked_at = self.worth_a_look(&at, chunk);
-        for round in 1..=MOST {
+        // Exchanges since that look.
+        let mut since = 0;
+        for _ in 0..MOST {
             let better = self.exchanged(&at, &looked_at, chunk, budget_s).filter(|new| new.is_surer(&at));
-            let look = better.is_none() || round % AGAIN == 0;
             match better {
-                Some(better) => at = better,
+                Some(better) => (at, since) = (better, since + 1),
+                None if since > 0 => since = AGAIN,
                 None if chunk == 1 => break,
-                None => chunk /= 2,
+                None => (chunk, since) = (chunk / 2, AGAIN),
             }
-            if look {
-                looked_at = self.worth_a_look(&at, chunk);
+            if since >= AGAIN {
+                (looked_at, since) = (self.worth_a_look(&at, chunk), 0);
             }
         }
         at.rows
@@ -373,16 +380,19 @@ mod tests {
         }
     }
 
-    /// Never longer, surer, and where nothing is known there is nothing to exchange.
+    /// Never longer, surer, without what can't be read, and where nothing is known there is nothing to exchange.
     #[test]
     fn exchanges_keep_the_time() {
         let sites = sites(40, 3, 5.0);
         let mut search = Search { sites: &sites, draws: vec![random(&sites, 2, 3, 3), random(&sites, 2, 3, 4)] };
+        // Saturated, say.
+        search.draws.iter_mut().for_each(|draw| draw.readings[7].own = f64::INFINITY);
         let rows: Vec<u32> = (0..40).map(|x| 2 + x % 5).collect();
         let better = search.better(rows.clone());
         let sure = |rows: &[u32]| search.at(rows.to_vec()).expect("determined").ln_sure();
         let gained = sure(&better) - sure(&rows);
         assert!(search.seconds(&better) <= search.seconds(&rows) * (1.0 + 1e-9) && gained > 0.5, "{gained}");
+        assert_eq!(better[7], 0, "nothing is read there");
         assert_eq!(search.better(vec![0; 40]), vec![0; 40]);
     }
 }

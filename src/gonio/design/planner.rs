@@ -1,5 +1,7 @@
 //! The plan: candidates, their information per second, the best shares of the time, whole readings.
 
+use glam::DVec3;
+
 use super::candidates::{self, Pair};
 use super::exchange::{Search, Sites};
 use super::information::{Model, Noise};
@@ -7,7 +9,7 @@ use super::optimum::{Optimum, Table, best};
 use super::precision::{Precision, counts, precision};
 use super::prior::{Prior, Wrong};
 use super::rounding::{self, Share};
-use crate::geometry::angles::{angle_between, phi_of, theta_of};
+use crate::geometry::angles::{phi_of, theta_of};
 use crate::geometry::mirror;
 use crate::gonio::cost::{dwell_s, visit_s};
 use crate::gonio::instrument::Instrument;
@@ -138,31 +140,51 @@ impl Weighed {
                 _ => {}
             }
         }
-        Ok(self.exchanged(best, wish, draws))
+        self.exchanged(best, wish, draws)
     }
 
     /// The same scan with rows exchanged where that makes it surer.
-    fn exchanged(&self, scan: Scanned, wish: &Wish<'_>, draws: &[Vec<f64>]) -> Scanned {
-        if Kept::of(wish.instrument).len() == 1 {
-            // The certificate at most, a factor of all readings alike.
-            return scan;
-        }
-        let own = (0..scan.shares.len()).map(|x| (scan.directions.pair(x), scan.shares[x].rows_per_stop));
-        let is_other = |pair: &Pair| (0..scan.directions.len()).all(|x| !same(scan.directions.pair(x), *pair));
-        let others = self.pairs.iter().zip(&self.stops).filter(|(pair, _)| is_other(pair));
-        let others = others.map(|(pair, stop)| (*pair, stop.rows_per_stop));
-        let (pairs, rows_per_stop): (Vec<Pair>, Vec<u32>) = own.chain(others).unzip();
+    fn exchanged(&self, scan: Scanned, wish: &Wish<'_>, draws: &[Vec<f64>]) -> Result<Scanned, Wrong> {
         let instrument = wish.instrument;
-        let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(instrument.protocol.block);
-        let mut rows = vec![0; pairs.len()];
+        if Kept::of(instrument).is_nothing() {
+            return Ok(scan);
+        }
+        let sites = self.sites(&scan, instrument);
+        let mut rows = vec![0; sites.pairs.len()];
         scan.rows.iter().for_each(|&x| rows[x as usize] += 1);
-        let sites = Sites { pairs, rows_per_stop, row_s, move_s: self.usual_s };
         let rows = Search::new(&sites, wish.prior, instrument, draws).better(rows);
         match whole(sites.shares(&rows), wish) {
-            Ok(other) if other.sureness() > scan.sureness() => other,
-            _ => scan,
+            Ok(other) if other.sureness() > scan.sureness() => Ok(other),
+            Err(wrong @ Wrong::TooMany { .. }) => Err(wrong),
+            _ => Ok(scan),
         }
     }
+
+    /// The pairs of a scan, turned by half a turn and mirrored at the plane of incidence as well, for errors may act on these the other way round; and all candidates.
+    fn sites(&self, scan: &Scanned, instrument: &Instrument) -> Sites {
+        let own = (0..scan.shares.len()).map(|x| (scan.directions.pair(x), scan.shares[x].rows_per_stop));
+        let others = self.pairs.iter().zip(&self.stops).map(|(pair, stop)| (*pair, stop.rows_per_stop));
+        let images = own.clone().flat_map(|(pair, rows)| IMAGES.map(|signs| (image(pair, signs), rows)));
+        let images = images.filter(|(pair, _)| counts(*pair, instrument));
+        let mut distinct: Vec<(Pair, u32)> = own.collect();
+        for (pair, rows) in others.chain(images) {
+            if !distinct.iter().any(|of| same(of.0, pair)) {
+                distinct.push((pair, rows));
+            }
+        }
+        let (pairs, rows_per_stop) = distinct.into_iter().unzip();
+        let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(instrument.protocol.block);
+        Sites { pairs, rows_per_stop, row_s, move_s: self.usual_s }
+    }
+}
+
+/// Signs of x and y that leave a reading of an isotropic material as it is, but not what errors of positions do to it.
+const IMAGES: [[f64; 2]; 3] = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
+
+fn image((wi, wo): Pair, [x, y]: [f64; 2]) -> Pair {
+    // Azimuths of 180°, not of −180°, where y is 0 but for rounding.
+    let of = |w: DVec3| DVec3::new(x * w.x, if w.y.abs() < 1e-12 { 0.0 } else { y * w.y }, w.z);
+    (of(wi), of(wo))
 }
 
 /// Whole readings.
@@ -198,7 +220,7 @@ fn whole(mut list: Vec<(Pair, Share)>, wish: &Wish<'_>) -> Result<Scanned, Wrong
 
 /// Whether two pairs are one but for rounding.
 fn same(a: Pair, b: Pair) -> bool {
-    angle_between(a.0, b.0) < 1e-6 && angle_between(a.1, b.1) < 1e-6
+    a.0.distance_squared(b.0) + a.1.distance_squared(b.1) < 1e-12
 }
 
 /// Each pair together with that on the other side of the mirror direction, where there is one: what moves a lobe raises the one and lowers the other.
@@ -221,7 +243,9 @@ fn mirrored(list: &[(Pair, Share)], instrument: &Instrument) -> Vec<(Pair, Share
 fn even_grid(wish: &Wish<'_>, step_deg: f64, move_s: f64, draws: &[Vec<f64>]) -> Vec<(Pair, Share)> {
     let Some((directions, _)) = (Scan::InPlane { step_deg }).directions() else { return Vec::new() };
     let pairs: Vec<Pair> = (0..directions.len()).map(|i| directions.pair(i)).collect();
-    let pairs: Vec<Pair> = pairs.into_iter().filter(|pair| counts(*pair, wish.instrument)).collect();
+    // Turned to where candidates have the source.
+    let pairs = pairs.into_iter().map(|pair| image(pair, [-1.0, -1.0]));
+    let pairs: Vec<Pair> = pairs.filter(|pair| counts(*pair, wish.instrument)).collect();
     let (stops, _) = tell(wish.prior, wish.instrument, move_s, &pairs, draws);
     let weight = 1.0 / pairs.len().max(1) as f64;
     pairs.into_iter().zip(stops).map(|(pair, stop)| (pair, Share { weight, ..stop })).collect()
@@ -237,9 +261,11 @@ impl Plan {
 }
 
 /// Where a pair stands in the order of reading: incidence by incidence, so that the source moves least.
-fn place((wi, wo): Pair) -> [f64; 3] {
+fn place((wi, wo): Pair) -> [f64; 4] {
+    let turned = wi.x > 1e-9;
+    let (wi, wo) = if turned { image((wi, wo), [-1.0, -1.0]) } else { (wi, wo) };
     let side = if wo.x < 0.0 { -1.0 } else { 1.0 };
-    [theta_of(wi), (side * phi_of(side * wo)).abs(), side * theta_of(wo)]
+    [f64::from(u8::from(turned)), theta_of(wi), (side * phi_of(side * wo)).abs(), side * theta_of(wo)]
 }
 
 /// Seconds of a move as a plan makes it: the mean over a round through candidates, as many as a plan has at most and evenly spread, in the order of
@@ -338,5 +364,47 @@ fn supported(table: &Table, optimum: &Optimum, most: usize) -> (Vec<usize>, Vec<
         let fewer: Vec<usize> = by_weight.iter().map(|&i| kept[i]).collect();
         let Some(again) = best(&table.picked(&fewer)) else { return (kept, weights) };
         (kept, weights) = (fewer, again.weights);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gonio::parts::{Axes, Holder};
+
+    /// Zeros and a tilt: surer than the even scan that it starts from, in no more time, no pair twice.
+    #[test]
+    fn exchanges_make_a_scan_surer() {
+        let axes = Axes { zero_u_deg: 0.05, move_s: 5.0, ..Axes::default() };
+        let sample = Holder { tilt_u_deg: 0.05, ..Holder::default() };
+        let instrument = Instrument { sample, axes, ..Instrument::default() };
+        let prior = Prior::usual(&"lambert+phong".parse().expect("a model")).expect("space");
+        let wish = Wish { prior: &prior, instrument: &instrument, budget_s: 900.0 };
+        let draws = prior.draws();
+        let weighed = Weighed::new(&wish, &draws).expect("determined");
+        let even = whole(even_grid(&wish, 7.0, weighed.usual_s, &draws), &wish).expect("time enough");
+        let sure = even.sureness();
+        let better = weighed.exchanged(even, &wish, &draws).expect("rows enough");
+        assert!(better.sureness() > sure + 1.0, "{} {sure}", better.sureness());
+        assert!(better.precision.hours <= 900.0 / 3600.0 + 1e-12, "{}", better.precision.hours);
+        let pair = |x: usize| better.directions.pair(x);
+        let n = better.directions.len();
+        assert!((0..n).all(|x| (0..x).all(|y| !same(pair(x), pair(y)))));
+    }
+
+    #[test]
+    fn readings_are_sorted_by_where_the_source_stands() {
+        let at = |i: f64, phi: f64, o: f64| {
+            (crate::geometry::angles::direction_deg(i, phi), crate::geometry::angles::direction_deg(o, 0.0))
+        };
+        let turned = image(at(30.0, 180.0, 40.0), [-1.0, -1.0]);
+        assert!(same(image(turned, [-1.0, -1.0]), at(30.0, 180.0, 40.0)));
+        assert!(turned.0.x > 0.0 && turned.1.x < 0.0);
+        assert_eq!(phi_of(image(turned, [-1.0, 1.0]).0), std::f64::consts::PI);
+        // All of one azimuth of the source first, by incidence; then those of the other.
+        assert!(
+            place(at(30.0, 180.0, 40.0)) < place(at(60.0, 180.0, 40.0)) && place(at(60.0, 180.0, 40.0)) < place(turned)
+        );
+        assert_eq!(place(turned)[1..], place(at(30.0, 180.0, 40.0))[1..]);
     }
 }

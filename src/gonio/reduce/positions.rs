@@ -258,6 +258,11 @@ impl<'a> Kept<'a> {
         std::iter::once(certificate).chain(linear).chain(bend.patterns()).collect()
     }
 
+    /// Whether no reading shares anything.
+    pub fn is_nothing(&self) -> bool {
+        self.errors.is_empty() && self.optics.instrument.reference.reflectance_u == 0.0
+    }
+
     /// How many there are.
     pub fn len(&self) -> usize {
         let errors = self.errors.len();

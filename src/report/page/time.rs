@@ -4,7 +4,7 @@ use crate::control::counted;
 use crate::report::plot::{Heading, LogLog, Marks, Point, Series, minus};
 use crate::report::run::{Made, Run};
 use crate::report::typed;
-use crate::report::views::{self, FrontSetting, Interval, SweepSlope};
+use crate::report::views::{self, Interval, SweepSlope, TriedSetting};
 use crate::report::words::{count, digits, number, percent, time as told};
 
 /// A stage and its time.
@@ -38,12 +38,15 @@ pub(super) struct Sweep {
     pub made: Option<(String, String)>,
     /// Charts of error against time and size, with what they show.
     pub charts: Vec<(String, String)>,
-    pub front: Vec<FrontRow>,
+    /// Settings that no other beats, and all of them.
+    pub front: Vec<SettingRow>,
+    pub settings: Vec<SettingRow>,
     pub slopes: Vec<SlopeRow>,
 }
 
-/// A setting that no other beats.
-pub(super) struct FrontRow {
+/// A setting that was tried.
+#[derive(Clone)]
+pub(super) struct SettingRow {
     pub mark: char,
     pub setting: String,
     pub curve: String,
@@ -117,6 +120,7 @@ fn sweep(found: &views::Sweep) -> Sweep {
         )
     };
     let slopes = found.curves.iter().flat_map(|c| c.slopes.iter().filter_map(|s| slope(&c.name, s)));
+    let rows = found.settings().iter().map(row).collect::<Vec<_>>();
     let trials = format!("{} of each setting, seed {}", counted(found.trials.into(), "trial"), found.seed);
     let settings = options_of("settings", &found.commands);
     let others = found.curves.iter().filter_map(|c| options_of(&format!("settings of {}", c.name), &c.commands));
@@ -127,7 +131,8 @@ fn sweep(found: &views::Sweep) -> Sweep {
         title: format!("{}: {}", found.stage, found.subject),
         said: said.collect::<Vec<_>>().join(" "),
         made: made(&Made::of(&found.run)),
-        front: found.front().iter().map(front).collect(),
+        front: rows.iter().filter(|row| row.mark != ' ').cloned().collect(),
+        settings: rows,
         charts: found.against_time().into_iter().chain(found.beside_theory()).map(chart).collect(),
         slopes: slopes.collect(),
     }
@@ -143,13 +148,13 @@ fn made(made: &Made) -> Option<(String, String)> {
     made.program.clone().filter(|_| !made.command.is_empty()).map(|program| (program, typed(&made.command)))
 }
 
-/// A setting of the Pareto front.
-fn front(found: &FrontSetting<'_>) -> FrontRow {
+/// A setting with its numbers.
+fn row(found: &TriedSetting<'_>) -> SettingRow {
     let three = |x: Option<f64>| x.map_or_else(|| "–".into(), |x| digits(x, 3));
     let Interval { value, low, high } = found.error;
     let kept = |(most, kept, of): (f64, usize, usize)| format!("{} in {kept} of {of}", number(most));
-    FrontRow {
-        mark: if found.is_undecided { '~' } else { '*' },
+    SettingRow {
+        mark: found.mark,
         setting: found.setting.into(),
         curve: found.curve.into(),
         time: found.seconds.map_or_else(|| "–".into(), told),

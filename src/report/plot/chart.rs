@@ -4,8 +4,11 @@ use super::Figure;
 use super::axes::{Area, Axis};
 use super::canvas::{Canvas, line};
 use super::heading::Heading;
-use super::legend::{dot_class, draw_legend, legend_rows, line_class, ring_class, wrapped};
+use super::legend::{RINGS, Sample, dot_class, draw_legend, legend_rows, line_class, wrapped};
 use super::scale::Scale;
+
+/// Radius of a ring, CSS pixels.
+pub(super) const RING: f64 = 5.5;
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,15 +20,6 @@ pub enum Marks {
     Dots,
     /// Dots on a line.
     Both,
-    /// Rings around points of other series: whole of colour 0, else dashed.
-    Rings,
-}
-
-impl Marks {
-    /// Whether points are joined.
-    pub(in crate::report) fn has_line(self) -> bool {
-        matches!(self, Self::Line | Self::Both)
-    }
 }
 
 /// A point of a series.
@@ -83,6 +77,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Whether error bars are drawn.
     pub bars: bool,
+    /// Places with rings about them: whole ones, and dashed ones.
+    pub rings: [Vec<Point>; 2],
     /// What is said where a pointer rests on a place.
     pub tips: Vec<(Point, String)>,
     /// Where the legend stands.
@@ -99,6 +95,7 @@ impl Default for Chart {
             y: Axis::new("", Scale::linear(0.0, 1.0)),
             series: Vec::new(),
             bars: true,
+            rings: [Vec::new(), Vec::new()],
             tips: Vec::new(),
             legend: LegendPlace::Below,
             size: (430.0, 330.0),
@@ -113,12 +110,17 @@ impl Chart {
         let (width, height) = self.size;
         let top = self.heading.top();
         let area = Area { left: 54.0, top, width: width - 54.0 - 16.0, height: height - top - 46.0 };
-        let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), s.marks, s.color)).collect();
+        let of_series = self.series.iter().map(|s| (s.name.as_str(), Sample::Series(s.marks, s.color)));
+        let of_rings = RINGS.iter().zip(&self.rings).filter(|(_, places)| !places.is_empty());
+        let names: Vec<_> = of_series.chain(of_rings.map(|((class, name), _)| (*name, Sample::Ring(class)))).collect();
         let rows = if self.legend == LegendPlace::Below { legend_rows(&names, width - 20.0) } else { Vec::new() };
         let mut canvas = self.heading.canvas(width, height + 18.0 * rows.len() as f64);
         area.frame(&mut canvas, (&self.x, (area.width / 64.0) as usize), (&self.y, 6), true);
         canvas.group("series", |c| self.series.iter().for_each(|s| self.draw(c, &area, s)));
         draw_legend(&mut canvas, &rows, 10.0, height + 8.0);
+        for ((class, _), places) in RINGS.iter().zip(&self.rings) {
+            places.iter().filter_map(|p| self.inside(&area, p)).for_each(|at| canvas.circle(class, at, RING));
+        }
         let tips = self.tips.iter().filter_map(|(point, says)| Some((self.inside(&area, point)?, says)));
         tips.for_each(|(at, says)| canvas.tip(at, says));
         self.heading
@@ -133,18 +135,14 @@ impl Chart {
             let d: String = series.points.iter().filter_map(|p| self.bar(area, p)).collect();
             canvas.path(&format!("error s{}", wrapped(series.color)), d);
         }
-        if series.marks.has_line() {
+        if series.marks != Marks::Dots {
             let pieces = self.pieces(area, &series.points);
             canvas.path(&line_class(series.color), pieces.into_iter().map(line).collect());
         }
-        let places = series.points.iter().filter_map(|p| self.inside(area, p));
-        match series.marks {
-            Marks::Line => {}
-            Marks::Dots | Marks::Both => {
-                let radius = if series.points.len() > 60 { 1.8 } else { 2.6 };
-                places.for_each(|at| canvas.circle(&dot_class(series.color), at, radius));
+        if series.marks != Marks::Line {
+            for at in series.points.iter().filter_map(|p| self.inside(area, p)) {
+                canvas.circle(&dot_class(series.color), at, if series.points.len() > 60 { 1.8 } else { 2.6 });
             }
-            Marks::Rings => places.for_each(|at| canvas.circle(&ring_class(series.color), at, 5.5)),
         }
     }
 

@@ -30,6 +30,8 @@ pub struct LogLog {
     pub series: Vec<Series>,
     /// Reference lines.
     pub slopes: Vec<Slope>,
+    /// Settings that no other beats in time and error, and those of which that is undecided: places with rings about them, whole and dashed.
+    pub front: [Vec<Point>; 2],
     /// What is said where a pointer rests on a place.
     pub tips: Vec<(Point, String)>,
 }
@@ -52,6 +54,7 @@ impl LogLog {
             x: Axis::new(&*self.x_label, x),
             y: Axis::new(&*self.y_label, y),
             series,
+            rings: self.front.clone(),
             tips: self.tips.clone(),
             ..Chart::default()
         };

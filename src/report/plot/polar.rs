@@ -6,7 +6,7 @@ use super::Figure;
 use super::canvas::{Canvas, Mark, Px, line, short};
 use super::chart::{Marks, Series};
 use super::heading::Heading;
-use super::legend::{dot_class, draw_legend, legend_rows, line_class};
+use super::legend::{Sample, dot_class, draw_legend, legend_rows, line_class};
 use super::scale::Scale;
 
 /// A polar chart over the half-plane above a surface: angles from −90° to 90°, 0° upwards, positive to the right.
@@ -38,7 +38,7 @@ impl PolarChart {
         let top = if self.heading.drawn { 46.0 } else { 26.0 };
         let center = (0.5 * self.width, top + radius);
         let base = center.1 + 46.0;
-        let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), s.marks, s.color)).collect();
+        let names: Vec<_> = self.series.iter().map(|s| (s.name.as_str(), Sample::Series(s.marks, s.color))).collect();
         let rows = if self.legend { legend_rows(&names, self.width - 20.0) } else { Vec::new() };
         let mut canvas = self.heading.canvas(self.width, base + 6.0 + 18.0 * rows.len() as f64);
         self.frame(&mut canvas, center, radius);

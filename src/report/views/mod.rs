@@ -16,4 +16,4 @@ pub use residuals::{Binned, ResidualMaps, Statistic, residual_figure, residual_m
 pub use slices::{
     Curve, Shown, Slice, default_channel, described, incidences, polar_figure, scale_of, slice, slice_figure,
 };
-pub use sweep::{FrontSetting, Interval, Law, Sweep, SweepCurve, SweepPlot, SweepSlope};
+pub use sweep::{Interval, Law, Sweep, SweepCurve, SweepPlot, SweepSlope, TriedSetting};

@@ -9,10 +9,6 @@ use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope, 
 use crate::report::words::{digits, time as told};
 use crate::tradeoff::Theory;
 
-/// What rings in plots mean.
-const FRONT: [(Standing, &str); 2] =
-    [(Standing::Front, "none is better in both"), (Standing::Undecided, "one is, within the intervals")];
-
 /// What `goniofit tradeoff` measured of a stage, as `tradeoff.json` has it; what is neither drawn nor listed is not read.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Sweep {
@@ -88,6 +84,14 @@ impl Cost {
     fn axis(self) -> Self {
         if self == Self::Both { Self::Instrument } else { self }
     }
+
+    fn whose(self) -> &'static str {
+        match self {
+            Self::Computer => "the computer",
+            Self::Instrument => "the instrument",
+            Self::Both => "both",
+        }
+    }
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -116,11 +120,11 @@ enum Standing {
     Unknown,
 }
 
-/// A setting that no other beats in both time and error.
+/// A setting that was tried.
 #[derive(Debug, Clone, Copy)]
-pub struct FrontSetting<'a> {
-    /// Whether one does, within the 95 % intervals.
-    pub is_undecided: bool,
+pub struct TriedSetting<'a> {
+    /// `*` where no other beats it in both time and error, `~` where one does, within the 95 % intervals; else a space.
+    pub mark: char,
     /// The curve that it is on.
     pub curve: &'a str,
     /// How it is typed.
@@ -198,21 +202,20 @@ impl Sweep {
         self.knobs().into_iter().flat_map(of).collect()
     }
 
-    /// The settings of the Pareto front, curve by curve, and those of which it is undecided.
+    /// The settings, curve by curve, those whose error is known.
     #[must_use]
-    pub fn front(&self) -> Vec<FrontSetting<'_>> {
-        self.curves.iter().flat_map(|curve| curve.points.iter().filter_map(|p| self.on_front(curve, p))).collect()
+    pub fn settings(&self) -> Vec<TriedSetting<'_>> {
+        self.curves.iter().flat_map(|curve| curve.points.iter().filter_map(|p| self.tried(curve, p))).collect()
     }
 
-    fn on_front<'a>(&'a self, curve: &'a SweepCurve, point: &'a Setting) -> Option<FrontSetting<'a>> {
-        let is_undecided = match point.standing {
-            Standing::Front => false,
-            Standing::Undecided => true,
-            Standing::Beaten | Standing::Unknown => return None,
-        };
+    fn tried<'a>(&'a self, curve: &'a SweepCurve, point: &'a Setting) -> Option<TriedSetting<'a>> {
         let measure = self.measures.iter().position(|m| m.name == curve.main)?;
-        Some(FrontSetting {
-            is_undecided,
+        Some(TriedSetting {
+            mark: match point.standing {
+                Standing::Front => '*',
+                Standing::Undecided => '~',
+                Standing::Beaten | Standing::Unknown => ' ',
+            },
             curve: &curve.name,
             setting: &point.typed,
             seconds: point.time(curve.cost),
@@ -253,26 +256,21 @@ impl Sweep {
         let own = |c: &&SweepCurve| c.cost.axis() == cost && c.main == main && c.is_of_effects() == of_effects;
         let curves = || self.curves.iter().filter(own);
         let time = |p: &Setting| p.time(cost);
-        let mut series = series(curves().map(|c| (c, c.points(measure, time), of_effects)));
-        for (color, (standing, said)) in FRONT.into_iter().enumerate() {
-            let of = |c: &SweepCurve| {
-                c.places(measure, time).filter(|(s, _)| s.standing == standing).map(|of| of.1).collect::<Vec<_>>()
-            };
-            let points: Vec<Point> = curves().flat_map(of).collect();
-            series.extend((!points.is_empty()).then(|| Series {
-                name: said.into(),
-                marks: Marks::Rings,
-                points,
-                color,
-            }));
-        }
-        let tips = curves().flat_map(|c| c.tips(measure, time)).collect();
-        let (whose, name) = match (cost, of_effects) {
-            (Cost::Computer, true) => ("the computer", format!("{main}-effects-time")),
-            (Cost::Computer, false) => ("the computer", format!("{main}-time")),
-            _ => ("the instrument", format!("{main}-instrument-time")),
+        let series = series(curves().map(|c| (c, c.points(measure, time), of_effects)));
+        // A chain's are compared by the time of both, and stand here by the instrument's.
+        let compared = || curves().filter(|c| c.cost == cost);
+        let front = [Standing::Front, Standing::Undecided].map(|standing| {
+            let of = |c| SweepCurve::places(c, measure, time).filter(|(s, _)| s.standing == standing).map(|of| of.1);
+            compared().flat_map(of).collect()
+        });
+        let tips = tips(curves(), measure, time);
+        let name = match (cost, of_effects) {
+            (Cost::Computer, true) => format!("{main}-effects-time"),
+            (Cost::Computer, false) => format!("{main}-time"),
+            _ => format!("{main}-instrument-time"),
         };
-        self.chart(name, (&format!("time of {whose} [s]"), main), series, Vec::new(), tips)
+        let chart = LogLog { series, front, tips, ..LogLog::default() };
+        self.plot(name, (&format!("time of {} [s]", cost.whose()), main), chart)
     }
 
     /// Errors of the curves of a knob against its size, those measures that are `wanted`.
@@ -293,32 +291,19 @@ impl Sweep {
                     }
                 }
             }
-            let tips = curves().flat_map(|c| c.tips(m, |p| p.size)).collect();
-            self.chart(format!("{}-{knob}", measure.name), (axis, &measure.name), series, slopes, tips)
+            let chart = LogLog { series, slopes, tips: tips(curves(), m, |p| p.size), ..LogLog::default() };
+            self.plot(format!("{}-{knob}", measure.name), (axis, &measure.name), chart)
         };
         self.measures.iter().enumerate().filter(|(_, measure)| wanted(&measure.name)).filter_map(of).collect()
     }
 
-    fn chart(
-        &self,
-        name: String,
-        (x, y): (&str, &str),
-        series: Vec<Series>,
-        slopes: Vec<Slope>,
-        tips: Vec<(Point, String)>,
-    ) -> Option<SweepPlot> {
-        if series.iter().all(|s| s.points.len() < 2) {
+    fn plot(&self, name: String, (x, y): (&str, &str), chart: LogLog) -> Option<SweepPlot> {
+        if chart.series.iter().all(|s| s.points.len() < 2) {
             return None;
         }
         let title = format!("{} {}: {y} against {x}", self.stage, self.subject);
-        let chart = LogLog {
-            heading: Heading { title, ..Heading::default() },
-            x_label: x.into(),
-            y_label: y.into(),
-            series,
-            slopes,
-            tips,
-        };
+        let heading = Heading { title, ..Heading::default() };
+        let chart = LogLog { heading, x_label: x.into(), y_label: y.into(), ..chart };
         let shows = format!("{y} against {}", x.trim_end_matches(" [s]"));
         Some(SweepPlot { name, shows, figure: chart.figure(), series: chart.series })
     }
@@ -364,18 +349,26 @@ impl SweepCurve {
     fn points(&self, measure: usize, x: impl Fn(&Setting) -> Option<f64>) -> Vec<Point> {
         self.places(measure, x).map(|of| of.1).collect()
     }
+}
 
-    /// What each of its settings is, takes and is off by.
-    fn tips(&self, measure: usize, x: impl Fn(&Setting) -> Option<f64>) -> Vec<(Point, String)> {
-        let tip = |(setting, point): (&Setting, Point)| {
+/// What each setting of these curves is, is off by and takes, where it stands in a plot.
+fn tips<'a>(
+    curves: impl Iterator<Item = &'a SweepCurve>,
+    measure: usize,
+    x: impl Fn(&Setting) -> Option<f64> + Copy,
+) -> Vec<(Point, String)> {
+    let of_curve = |curve: &'a SweepCurve| {
+        curve.places(measure, x).map(move |(setting, point)| {
             let interval = point
                 .bar
                 .map_or_else(String::new, |(low, high)| format!(" ({} to {})", digits(low, 3), digits(high, 3)));
-            let took = setting.time(self.cost).map_or_else(String::new, |s| format!(", {}", told(s)));
-            (point, format!("{}: {}{interval}{took}", setting.typed, digits(point.y, 3)))
-        };
-        self.places(measure, x).map(tip).collect()
-    }
+            let took = setting
+                .time(curve.cost)
+                .map_or_else(String::new, |s| format!(", {} of {}", told(s), curve.cost.whose()));
+            (point, format!("{}: {}: {}{interval}{took}", curve.name, setting.typed, digits(point.y, 3)))
+        })
+    };
+    curves.flat_map(of_curve).collect()
 }
 
 /// Series with colours of their own; those of single settings are dots.
