@@ -45,6 +45,15 @@ pub(super) struct What {
     pub noiseless: bool,
 }
 
+impl What {
+    /// The files that are named, so far as these are files.
+    pub fn inputs(&self) -> Vec<&Path> {
+        let listed = self.scan.as_deref().and_then(|scan| scan.strip_prefix("list:"));
+        let named = [self.material.as_deref(), self.instrument.as_deref(), listed];
+        self.spec.as_deref().into_iter().chain(named.into_iter().flatten().map(Path::new)).collect()
+    }
+}
+
 /// What to simulate, checked.
 pub(super) struct Plan {
     pub material: String,

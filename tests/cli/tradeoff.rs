@@ -515,6 +515,25 @@ fn what_can_t_be_had_is_said() {
     assert!(found["advice"][0]["advice"].is_null() && found["curves"][0]["points"].is_array(), "{found}");
     let ran = b.run(&[&fit[..], &["--advise", "error"]].concat());
     assert_eq!(ran.code, Some(2));
+    // Before any trial: errors that none tells, references worse than what is measured, what leaves nothing, outputs that are inputs.
+    std::fs::create_dir(b.path("t")).expect("a folder");
+    b.write("t/tradeoff.csv", b.bytes("paint.csv"));
+    for (args, says) in [
+        ("tradeoff fit paint.csv --advise noise=1%", "expected an error out of excess, parameters, image"),
+        ("tradeoff render --size 8 --advise bias=1%", "expected an error out of error, flip"),
+        ("tradeoff render --size 8 --samples 8,64 --reference 32", "no fewer samples than the 64"),
+        ("tradeoff fit paint.csv --parts 1,1000000", "one of every 1000000 leaves nothing"),
+        ("tradeoff simulate --material satin --steps 10,91", "from 0.1 to 45 degrees"),
+        ("tradeoff fit t/tradeoff.csv --out t", "would destroy the input"),
+        ("tradeoff render --size 8 --material t/tradeoff.csv --out t", "would destroy the input"),
+        ("tradeoff simulate --material t/tradeoff.csv --out t", "would destroy the input"),
+    ] {
+        let ran = b.run(&typed(args));
+        assert!(ran.code == Some(2) && ran.err.contains(says), "{args}: {:?} {}", ran.code, ran.err);
+    }
+    assert_eq!(b.bytes("t/tradeoff.csv"), b.bytes("paint.csv"));
+    let ran = b.run(&typed("tradeoff simulate --material satin --knobs quadrature --trials 2"));
+    assert!(ran.code == Some(1) && ran.err.contains("nothing to try"), "{}", ran.err);
     let ran = b.run(&[&fit[..], &["--time-budget", "1us"]].concat());
     assert!(ran.code == Some(1) && ran.err.contains("more time"), "{}", ran.err);
     // Before any picture is taken.

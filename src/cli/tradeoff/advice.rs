@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::print::{filled, time};
+use crate::cli::failure::Failure;
 use crate::cli::fit::{parse_share, parse_time};
 use crate::cli::ui::significant;
 use crate::report;
@@ -27,6 +28,23 @@ pub(super) fn parse(text: &str) -> Result<Asked, String> {
         measure => Wish::Error(Some(measure.to_owned()), parse_share(value)?),
     };
     Ok(Asked { typed: text.to_owned(), wish })
+}
+
+impl Asked {
+    /// Whether trials tell the error that is asked for, out of these.
+    ///
+    /// # Errors
+    /// That they don't.
+    pub fn is_told(&self, told: &[&str]) -> Result<(), Failure> {
+        match &self.wish {
+            Wish::Error(Some(name), _) if !told.contains(&name.as_str()) => Err(Failure::usage(format!(
+                "--advise {}: expected an error out of {} (or error, for that of each curve), found {name}",
+                self.typed,
+                told.join(", ")
+            ))),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// What was asked for, and the answers.

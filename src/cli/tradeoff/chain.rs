@@ -18,7 +18,7 @@ use crate::cli::ui::Ui;
 use crate::gonio::Scan;
 use crate::gonio::sight::Cones;
 use crate::measurement::Dimension;
-use crate::tradeoff::chain::{ChainSweep, Share, sweep};
+use crate::tradeoff::chain::{ChainSweep, Share, TOLD, sweep};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -53,7 +53,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
-    args.common.prepare()?;
+    args.common.prepare(&TOLD, &args.what.inputs())?;
     let plan = Plan::new(&args.what, None)?;
     let (source, name) = plan.load()?;
     let Source::Fitted(material) = &source else {

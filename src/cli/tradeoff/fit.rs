@@ -11,7 +11,7 @@ use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
 use crate::fit::Loss;
 use crate::measurement::formats;
-use crate::tradeoff::fit::{FitSweep, sweep};
+use crate::tradeoff::fit::{FitSweep, TOLD, sweep};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -55,7 +55,7 @@ const GROWTH: usize = 2;
 const LEAST: usize = 200;
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
-    args.common.prepare()?;
+    args.common.prepare(&TOLD, &[&args.file])?;
     let (Some(model), Some(loss)) = (args.models.first(), args.losses.first()) else {
         return Err(Failure::usage("expected at least one model and one loss"));
     };
@@ -63,6 +63,15 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let table = formats::read(&args.file, &args.reading.options())?;
     for note in &table.notes {
         ui.note(&format!("{}: note: {note}", args.file.display()));
+    }
+    for (option, list) in [("--parts", &args.parts), ("--strides", &args.strides)] {
+        if let Some(found) = list.iter().find(|n| **n as usize > table.len()) {
+            return Err(Failure::usage(format!(
+                "{option}: one of every {found} leaves nothing; {} has {} directions",
+                args.file.display(),
+                table.len()
+            )));
+        }
     }
     let mut parts = descending(&args.parts);
     if parts.is_empty() && args.strides.is_empty() {

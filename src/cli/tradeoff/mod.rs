@@ -1,13 +1,14 @@
 //! `goniofit tradeoff`: what accuracy costs in time, for the fit, the picture, the simulated measurement and the whole chain.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::failure::Failure;
 use super::fit::parse_time;
-use super::output::make_folder;
+use super::output::{keeps_inputs, make_folder};
 use super::report::made;
 use super::ui::{self, Ui};
+use crate::report::run::SWEEP;
 use crate::tradeoff::{Effort, Sweep};
 
 mod advice;
@@ -66,19 +67,27 @@ impl Common {
         Effort { trials: self.trials, seed, deadline }
     }
 
-    /// The folder for outputs, made before long work starts.
-    fn prepare(&self) -> Result<(), Failure> {
-        self.out.as_deref().map_or(Ok(()), |folder| make_folder("--out", folder))
+    /// What can be known to be wrong before long work starts: errors that no trial of the stage tells, outputs that are inputs. Makes the folder for outputs.
+    fn prepare(&self, told: &[&str], inputs: &[&Path]) -> Result<(), Failure> {
+        self.advise.iter().try_for_each(|asked| asked.is_told(told))?;
+        let Some(folder) = &self.out else { return Ok(()) };
+        for name in [write::TABLE, SWEEP] {
+            keeps_inputs("--out", &folder.join(name), inputs.iter().copied())?;
+        }
+        make_folder("--out", folder)
     }
 
     /// Says and writes what was found.
     fn finish(&self, sweep: &Sweep, more: Option<(String, serde_json::Value)>, ui: &Ui) -> Result<(), Failure> {
         if sweep.curves.is_empty() {
-            let why = sweep.ended.clone().unwrap_or_else(|| "there is nothing to try".into());
-            return Err(if ui::stop().requested() {
-                Failure::stopped("stopped before the first trial was over: nothing is written")
-            } else {
-                Failure::work(format!("no trial was made: {why}; give more time, or fewer or smaller settings"))
+            return Err(match &sweep.ended {
+                _ if ui::stop().requested() => {
+                    Failure::stopped("stopped before the first trial was over: nothing is written")
+                }
+                Some(why) => {
+                    Failure::work(format!("no trial was made: {why}; give more time, or fewer or smaller settings"))
+                }
+                None => Failure::work("nothing to try: what was swept has none of what these knobs turn"),
             });
         }
         let advice = advice::all(&self.advise, sweep);
@@ -113,6 +122,14 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         Stage::Simulate(args) => simulate::run(args, ui),
         Stage::Chain(args) => chain::run(args, ui),
     }
+}
+
+/// A step of a scan, degrees, from a list.
+fn parse_step(text: &str) -> Result<f64, String> {
+    parse_positive(text)
+        .ok()
+        .filter(|step| (0.1..=45.0).contains(step))
+        .ok_or_else(|| "expected steps from 0.1 to 45 degrees".into())
 }
 
 /// A number above 0 and finite, from a list.

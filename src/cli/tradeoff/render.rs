@@ -1,19 +1,18 @@
 //! `goniofit tradeoff render`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::Common;
+use super::{Common, parse_step};
 use crate::chain::{self, Source, Stage};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::render::{parse_rgb, parse_size, read_stage};
 use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
-use crate::gonio::Scan;
 use crate::measurement::ReadOptions;
 use crate::render::{Material, Strategy};
 use crate::tradeoff::Knob;
-use crate::tradeoff::render::{RenderSweep, Tables, Way, sweep};
+use crate::tradeoff::render::{RenderSweep, TOLD, Tables, Way, sweep};
 
 /// Longer side of the pictures, pixels, where none is asked for.
 const SIDE: f64 = 64.0;
@@ -78,16 +77,9 @@ fn parse_way(text: &str) -> Result<Way, String> {
     }
 }
 
-/// The step of a scan all round, degrees.
-fn parse_step(text: &str) -> Result<f64, String> {
-    match format!("hemisphere:{}", text.trim()).parse::<Scan>() {
-        Ok(Scan::Hemisphere { step_deg }) => Ok(step_deg),
-        _ => Err("expected steps from 0.1 to 45 degrees".into()),
-    }
-}
-
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
-    args.common.prepare()?;
+    let inputs = [args.file.as_deref(), args.material.as_deref().map(Path::new)];
+    args.common.prepare(&TOLD, &inputs.into_iter().flatten().collect::<Vec<_>>())?;
     let (stage, named) = match (&args.file, &args.scene) {
         (Some(file), _) => (read_stage(file)?, vec![file.display().to_string()]),
         (None, name) => {
@@ -112,6 +104,12 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let mut samples = args.samples.clone();
     samples.sort_unstable();
     samples.dedup();
+    let most = samples.last().copied().unwrap_or(0);
+    if let Some(found) = args.reference.filter(|n| *n < most) {
+        return Err(Failure::usage(format!(
+            "--reference: expected no fewer samples than the {most} that are tried, found {found}"
+        )));
+    }
     let what = RenderSweep { size, samples, targets: args.targets.clone(), ways, reference: args.reference, tables };
     let effort = args.common.effort(args.seed, ui);
     let mut found = sweep(&stage, subject.as_ref(), &what, &effort, ui.control())?;

@@ -1,13 +1,13 @@
 //! `goniofit tradeoff simulate`.
 
-use super::{Common, parse_positive};
+use super::{Common, parse_positive, parse_step};
 use crate::cli::failure::Failure;
 use crate::cli::fit::parse_tolerance;
 use crate::cli::simulation::{Plan, What};
 use crate::cli::text::{command, option};
 use crate::cli::ui::Ui;
 use crate::gonio::{self, MOST_ORDER, Scan};
-use crate::tradeoff::simulate::{SimulateSweep, sweep};
+use crate::tradeoff::simulate::{SimulateSweep, TOLD, sweep};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -26,8 +26,8 @@ pub(super) struct Args {
     /// Exposures, as multiples of the instrument's
     #[arg(long, value_delimiter = ',', value_name = "X,X,…", default_value = "0.25,0.5,1,2,4", value_parser = parse_positive)]
     exposures: Vec<f64>,
-    /// Steps of the scan, degrees
-    #[arg(long, value_delimiter = ',', value_name = "DEG,…", default_value = "15,10,7.5,5", value_parser = parse_positive)]
+    /// Steps of the scan, degrees, 0.1 to 45
+    #[arg(long, value_delimiter = ',', value_name = "DEG,…", default_value = "15,10,7.5,5", value_parser = parse_step)]
     steps: Vec<f64>,
     /// Relative errors that means over cones may have, as by `simulate --target-error`
     #[arg(long, value_delimiter = ',', value_name = "E,E,…", default_value = "0.1,0.01,1e-3,1e-4,1e-6,1e-8", value_parser = parse_tolerance)]
@@ -46,7 +46,7 @@ fn parse_knob(text: &str) -> Result<&'static str, String> {
 }
 
 pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
-    args.common.prepare()?;
+    args.common.prepare(&TOLD, &args.what.inputs())?;
     let plan = Plan::new(&args.what, None)?;
     let (source, name) = plan.load()?;
     if matches!(plan.scan, Scan::Adaptive { .. }) {
@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         quadrature,
         orders: list(on("order") && has_means, &args.orders),
         effects: on("effects"),
-        readings: list(on("readings"), &args.average),
+        readings: list(on("readings") && plan.instrument.is_noisy(), &args.average),
         dwell: list(on("exposure") && plan.instrument.is_noisy(), &args.exposures),
         steps,
     };

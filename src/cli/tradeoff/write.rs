@@ -11,7 +11,7 @@ use crate::report::{typed, views};
 use crate::tradeoff::{Sweep, to_csv};
 
 /// The trials' numbers, a row a setting.
-const TABLE: &str = "tradeoff.csv";
+pub(super) const TABLE: &str = "tradeoff.csv";
 /// Width of the PNG plots, pixels.
 const PIXELS: u32 = 1200;
 

@@ -285,9 +285,9 @@ impl Sweep {
                 if let Some(slope) = curve.slope(&measure.name).and_then(|s| s.slope.value) {
                     of.name = format!("{}, slope {}", of.name, minus(&format!("{slope:.2}")));
                 }
-                for slope in curve.theory(&measure.name) {
+                for (name, slope) in curve.theory(&measure.name) {
                     if !slopes.iter().any(|s| s.slope == slope) {
-                        slopes.push(Slope { name: format!("theory {}", minus(&slope.to_string())), slope, beside });
+                        slopes.push(Slope { name: format!("theory {name}"), slope, beside });
                     }
                 }
             }
@@ -330,10 +330,16 @@ impl SweepCurve {
         self.slopes.iter().find(|s| s.measure == measure)
     }
 
-    /// The slopes that theory names for a measure; none where it names none.
-    fn theory(&self, measure: &str) -> Vec<f64> {
-        let law = self.slope(measure).and_then(|s| s.law.as_ref());
-        law.map_or_else(Vec::new, |law| law.theory.slopes())
+    /// The slopes that theory names for a measure, one that is a bound as such; none where it names none.
+    fn theory(&self, measure: &str) -> Vec<(String, f64)> {
+        let told = |slope: f64| minus(&slope.to_string());
+        let Some(theory) = self.slope(measure).and_then(|s| s.law.as_ref()).map(|law| law.theory) else {
+            return Vec::new();
+        };
+        match theory.slopes()[..] {
+            [slope] => vec![(theory.said(told), slope)],
+            ref ends => ends.iter().map(|&slope| (told(slope), slope)).collect(),
+        }
     }
 
     /// The settings whose error is known to be more than 0, and where they stand in a plot.

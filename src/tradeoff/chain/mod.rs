@@ -49,6 +49,9 @@ pub struct ChainSweep<'a> {
     pub budgets: Vec<f64>,
 }
 
+/// The errors that each trial tells, so that advice can be asked for.
+pub const TOLD: [&str; 3] = ["image", "parameters", "brdf"];
+
 const MEASURES: [Measure; 3] = [
     Measure {
         name: "image",
@@ -83,7 +86,8 @@ pub fn sweep(what: &ChainSweep<'_>, effort: &Effort, control: Control<'_>) -> Re
     }
     let mut found = curves(&series, &settings, &MEASURES, &runs, &Beside::NOTHING);
     let mut shares = shares::all(what, &settings, &runs);
-    let (mut ended, notes) = (runs.ended, shares::notes(&shares));
+    let notes = shares::notes(what, &settings, &runs);
+    let mut ended = runs.ended;
     if ended.is_none() && !shares.is_empty() {
         let (whole, more) = tried(&mut links, &mut shares, effort, control)?;
         found.extend(whole);

@@ -169,10 +169,14 @@ pub(super) fn all(what: &ChainSweep<'_>, settings: &[Setting<Try>], runs: &Runs)
     shares
 }
 
-/// What a reader must know of them.
-pub(super) fn notes(shares: &[Share]) -> Vec<String> {
-    let none = "no setting fits into the budget";
-    if shares.is_empty() { vec![none.into()] } else { Vec::new() }
+/// What a reader must know of them: budgets that buy nothing.
+pub(super) fn notes(what: &ChainSweep<'_>, settings: &[Setting<Try>], runs: &Runs) -> Vec<String> {
+    let least = Known::of(settings, runs).shares().map(|s| s.seconds()).fold(f64::INFINITY, f64::min);
+    if least == f64::INFINITY {
+        return vec!["no setting of the whole was tried: its links have too few trials".into()];
+    }
+    let small = what.budgets.iter().filter(|budget| **budget < least);
+    small.map(|budget| format!("no setting fits into {budget:.3} s in all: the least takes {least:.3} s")).collect()
 }
 
 #[cfg(test)]

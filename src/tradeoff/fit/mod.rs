@@ -36,6 +36,9 @@ pub struct FitSweep {
     pub models: Vec<ModelSpec>,
 }
 
+/// The errors that each trial tells, so that advice can be asked for.
+pub const TOLD: [&str; 3] = ["excess", "parameters", "image"];
+
 const MEASURES: [Measure; 3] = [
     Measure { name: "excess", what: "rmse over all samples over the least one found, less 1" },
     Measure {

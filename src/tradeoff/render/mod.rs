@@ -61,6 +61,9 @@ const BETTER: u32 = 4;
 const GIB: f64 = (1u64 << 30) as f64;
 const ROOM: f64 = 4.0 * GIB;
 
+/// The errors that each trial tells, so that advice can be asked for.
+pub const TOLD: [&str; 2] = ["error", "flip"];
+
 /// The last is of tables alone.
 const MEASURES: [Measure; 5] = [
     Measure { name: "error", what: "root of the mean of (x − truth)²/(truth² + (L̄/10)²)" },

@@ -45,6 +45,9 @@ pub struct SimulateSweep<'a> {
     pub steps: Vec<f64>,
 }
 
+/// The errors that each trial tells, so that advice can be asked for.
+pub const TOLD: [&str; 3] = ["reading", "brdf", "parameters"];
+
 const MEASURES: [Measure; 3] = [
     Measure {
         name: "reading",
