@@ -1,9 +1,11 @@
 //! The sweep: trials of all settings, round after round, in an order that drifts of the machine do not favour.
 
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use super::design::Setting;
-use crate::control::Control;
+use crate::control::{Control, Stop};
 use crate::numeric::random::mix;
 
 /// What one trial told.
@@ -48,6 +50,38 @@ pub(super) struct Runs {
 /// threads, pages of memory) would be a large part of the first. Errors are the same either way, whatever the clock says.
 const WARM: Duration = Duration::from_millis(500);
 
+/// How often it is looked whether to stop.
+const WATCH: Duration = Duration::from_millis(10);
+
+/// Work that is asked to stop when its caller is, or when the effort's time is up.
+pub(super) fn limited<R>(effort: &Effort, control: Control<'_>, work: impl FnOnce(Control<'_>) -> R) -> R {
+    let Some(end) = effort.deadline else { return work(control) };
+    let stop = Stop::new();
+    // Dropped when the work is over, whichever way it ends.
+    let (over, watched) = channel::<()>();
+    thread::scope(|scope| {
+        let _over = over;
+        let (stop, outer) = (&stop, control.stop);
+        scope.spawn(move || {
+            let goes_on = || watched.recv_timeout(WATCH) == Err(RecvTimeoutError::Timeout);
+            while goes_on() {
+                if outer.requested() || Instant::now() >= end {
+                    stop.request();
+                    break;
+                }
+            }
+        });
+        work(Control { stop, ..control })
+    })
+}
+
+/// Why work that was asked to stop was.
+fn why_stopped(effort: &Effort) -> String {
+    if effort.deadline.is_some_and(|end| Instant::now() >= end) { LATE.into() } else { "stopped".into() }
+}
+
+const LATE: &str = "the time ended it";
+
 /// Tries every setting in every round. `trial` gets the setting's index.
 ///
 /// # Errors
@@ -67,11 +101,11 @@ pub(super) fn run<S, E>(
         let order: Vec<usize> = if round % 2 == 0 { (0..count).collect() } else { (0..count).rev().collect() };
         for index in order {
             if control.stop.requested() {
-                runs.ended = Some("stopped".into());
+                runs.ended = Some(why_stopped(effort));
                 break 'rounds;
             }
             if effort.deadline.is_some_and(|end| is_late(end, predicted(settings, &lasted, index))) {
-                runs.ended = Some("the time ended it".into());
+                runs.ended = Some(LATE.into());
                 control.progress.advance(1);
                 continue;
             }
@@ -85,7 +119,7 @@ pub(super) fn run<S, E>(
                 found = trial(index, turn(true))?;
             }
             if control.stop.requested() {
-                runs.ended = Some("stopped".into());
+                runs.ended = Some(why_stopped(effort));
                 break 'rounds; // half a trial says nothing
             }
             lasted[index] = Some(began.elapsed());
@@ -173,6 +207,24 @@ mod tests {
         .expect("runs");
         assert_eq!((runs.trials[0].len(), runs.trials[1].len()), (3, 0));
         assert!(runs.ended.is_some());
+    }
+
+    /// A trial without end.
+    #[test]
+    fn what_still_runs_when_time_is_up_is_stopped() {
+        let end = Instant::now() + Duration::from_millis(100);
+        let effort = effort(3, Some(end));
+        let runs = limited(&effort, Control::silent(), |control| {
+            run::<_, ()>(&settings(&[1.0, 2.0]), &effort, control, |index, _| {
+                while index == 1 && !control.stop.requested() {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                Ok(Trial { seconds: 1.0, errors: vec![] })
+            })
+        });
+        let runs = runs.expect("runs");
+        assert_eq!((runs.trials[0].len(), runs.trials[1].len()), (1, 0));
+        assert_eq!(runs.ended.as_deref(), Some(LATE));
     }
 
     #[test]

@@ -502,6 +502,24 @@ fn follow(b: &Bench, text: &str, commands: usize) {
     lines.into_iter().for_each(|line| _ = b.ok(&typed(line)));
 }
 
+/// A target that no picture reaches would go on without end.
+#[test]
+fn a_sweep_ends_when_its_time_is_up() {
+    let b = Bench::new();
+    let sweep =
+        "tradeoff render --size 16 --samples 4,8 --trials 2 --targets 1e-9 --ways scene --time-budget 4s --out t";
+    let ran = b.run(&typed(sweep));
+    // On a machine that is too busy for one picture in that time nothing is told.
+    assert!(matches!(ran.code, Some(0 | 1)) && ran.err.contains("the time ended it"), "{:?} {}", ran.code, ran.err);
+    if ran.code == Some(0) {
+        let found = b.json_file("t/tradeoff.json");
+        assert_eq!(found["ended"], "the time ended it");
+        let names: Vec<&str> =
+            found["curves"].as_array().expect("curves").iter().filter_map(|c| c["name"].as_str()).collect();
+        assert_eq!(names, ["plan of the scene"], "the target's trial was not over");
+    }
+}
+
 #[test]
 fn what_can_t_be_had_is_said() {
     let b = Bench::new();

@@ -48,8 +48,8 @@ struct Common {
     /// Trials of each setting, each with a seed of its own
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     trials: u32,
-    /// Time for all of it (30s, 5m): a trial is not begun where earlier ones say that it would end too late. References and
-    /// a curve's first trial are not foreseen
+    /// Time for all of it, references too (30s, 5m): a trial is not begun where earlier ones say that it would end too late, and one that still runs
+    /// then does not count
     #[arg(long, value_name = "T", value_parser = parse_time)]
     time_budget: Option<Duration>,
     /// The setting for a wanted error (error=1e-3, flip=0.01, …), time (time=2s) or time of the instrument (instrument=30m), with 95 % confidence; may

@@ -9,7 +9,7 @@ use super::curve::{About, Beside, Curve, Sweep, curves};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
 use super::simulate::laws::{self, Shown};
-use super::sweep::{Effort, Runs, Trial, run};
+use super::sweep::{Effort, Runs, Trial, limited, run};
 use crate::brdf::{Material, ModelSpec};
 use crate::chain::{ChainError, Stage};
 use crate::control::Control;
@@ -71,6 +71,10 @@ const SOBOL: Law =
 /// # Errors
 /// [`ChainError`] where a link fails.
 pub fn sweep(what: &ChainSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<(Sweep, Vec<Share>), ChainError> {
+    limited(effort, control, |control| swept(what, effort, control))
+}
+
+fn swept(what: &ChainSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<(Sweep, Vec<Share>), ChainError> {
     let began = Instant::now();
     let mut links = Links::new(what, effort.seed, control)?;
     let (mut series, settings) = design(what, &links);

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::curve::{About, Beside, Sweep, curves, words};
 use super::design::{Cost, Law, Measure, Series, Setting};
 use super::knob::Knob;
-use super::sweep::{Effort, Trial, run};
+use super::sweep::{Effort, Trial, limited, run};
 use crate::brdf::{Material, ModelSpec};
 use crate::chain::ChainError;
 use crate::control::Control;
@@ -63,6 +63,15 @@ struct Way {
 /// # Errors
 /// [`ChainError`] where a fit has no answer.
 pub fn sweep(
+    measurement: &Measurement,
+    what: &FitSweep,
+    effort: &Effort,
+    control: Control<'_>,
+) -> Result<Sweep, ChainError> {
+    limited(effort, control, |control| swept(measurement, what, effort, control))
+}
+
+fn swept(
     measurement: &Measurement,
     what: &FitSweep,
     effort: &Effort,

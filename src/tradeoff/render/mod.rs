@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::curve::{About, Beside, Sweep, curves, words};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
-use super::sweep::{Effort, Runs, Trial, run};
+use super::sweep::{Effort, Runs, Trial, limited, run};
 use crate::chain::{self, ChainError, Stage};
 use crate::control::Control;
 use crate::image::{Image, compare};
@@ -135,6 +135,16 @@ struct Shot {
 /// # Errors
 /// [`ChainError`] where the scene can't be built or rendered, or there is no room for so many pictures of this size.
 pub fn sweep(
+    stage: &Stage,
+    subject: Option<&Material>,
+    what: &RenderSweep,
+    effort: &Effort,
+    control: Control<'_>,
+) -> Result<Sweep, ChainError> {
+    limited(effort, control, |control| swept(stage, subject, what, effort, control))
+}
+
+fn swept(
     stage: &Stage,
     subject: Option<&Material>,
     what: &RenderSweep,

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::curve::{About, Beside, Sweep, curves, words};
 use super::design::{Cost, Law, Measure, Series, Setting, Theory};
 use super::knob::Knob;
-use super::sweep::{Effort, run};
+use super::sweep::{Effort, limited, run};
 use crate::chain::{ChainError, Source};
 use crate::control::Control;
 use crate::gonio::{self, Instrument, Scan, lit_rows};
@@ -73,6 +73,10 @@ const KINKED: Law = Law {
 /// # Errors
 /// [`ChainError`] where it can't be made or reduced.
 pub fn sweep(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<Sweep, ChainError> {
+    limited(effort, control, |control| swept(what, effort, control))
+}
+
+fn swept(what: &SimulateSweep<'_>, effort: &Effort, control: Control<'_>) -> Result<Sweep, ChainError> {
     let began = Instant::now();
     let mut bench = Bench::new(what, effort.seed, control);
     let (mut series, settings) = design(what);
