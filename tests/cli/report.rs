@@ -253,6 +253,26 @@ fn a_folder_of_sweeps_alone_has_a_page_of_its_own() {
 }
 
 #[test]
+fn a_sweep_that_ended_early_is_said_to_have() {
+    let b = Bench::new();
+    std::fs::create_dir(b.path("s")).unwrap();
+    let trial = json!({"seconds": 0.1, "errors": [0.2]});
+    let mut sweep: serde_json::Value = serde_json::from_str(SWEEP).unwrap();
+    sweep["trials"] = json!(8);
+    sweep["ended"] = json!("stopped");
+    for (k, made) in [3, 2, 2].into_iter().enumerate() {
+        sweep["curves"][0]["points"][k]["trials"] = json!(vec![trial.clone(); made]);
+    }
+    b.write("s/tradeoff.json", sweep.to_string());
+    let ran = b.ok(&["report", "s", "--json"]);
+    let (said, page) = (ran.json(), b.text("s/report.html"));
+    let note = "The sweep render: cornell was stopped early: of 8 trials asked for, each setting shown has 2 to 3.";
+    assert!(said["notes"][0].as_str().is_some_and(|n| n.starts_with(note)) && said["warnings"] == 1, "{said}");
+    assert!(ran.err.contains(&format!("warning: {note}")) && page.contains(note), "{}", ran.err);
+    assert!(!page.contains("8 trials of each setting"));
+}
+
+#[test]
 fn sweeps_and_effects_in_the_folder_join_the_page() {
     let b = Bench::new();
     b.ok(&["demo", "--size", "24", "--samples", "4", "--out", "d"]);

@@ -1,6 +1,5 @@
 //! What accuracy took in time, as far as the run's files have it.
 
-use crate::control::counted;
 use crate::report::plot::{Heading, LogLog, Marks, Point, Series, minus};
 use crate::report::run::{Made, Run};
 use crate::report::typed;
@@ -121,7 +120,7 @@ fn sweep(found: &views::Sweep) -> Sweep {
     };
     let slopes = found.curves.iter().flat_map(|c| c.slopes.iter().filter_map(|s| slope(&c.name, s)));
     let rows = found.settings().iter().map(row).collect::<Vec<_>>();
-    let trials = format!("{} of each setting, seed {}", counted(found.trials.into(), "trial"), found.seed);
+    let trials = format!("{}, seed {}", found.trials_said(), found.seed);
     let settings = options_of("settings", &found.commands);
     let others = found.curves.iter().filter_map(|c| options_of(&format!("settings of {}", c.name), &c.commands));
     let said =

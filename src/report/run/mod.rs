@@ -152,6 +152,7 @@ impl Run {
             loose::read(folder, options)?
         };
         run.add_extras();
+        run.notes.extend(run.sweeps.iter().filter_map(Sweep::cut_short));
         Ok(run)
     }
 

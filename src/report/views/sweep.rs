@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use serde_json::Value;
 
+use crate::control::counted;
 use crate::report::plot::{Figure, Heading, LogLog, Marks, Point, Series, Slope, minus};
 use crate::report::words::{digits, time as told};
 use crate::tradeoff::Theory;
@@ -34,12 +36,15 @@ pub struct Sweep {
     /// What a reader must know.
     #[serde(default)]
     pub notes: Vec<String>,
-    /// Trials of each setting.
+    /// Trials asked for of each setting.
     #[serde(default)]
     pub trials: u32,
     /// Key of all seeds.
     #[serde(default)]
     pub seed: u64,
+    /// Why there are fewer trials than asked for, where that is so.
+    #[serde(default)]
+    pub ended: Option<String>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -107,6 +112,8 @@ struct Setting {
     judged: Option<usize>,
     #[serde(default)]
     standing: Standing,
+    #[serde(default)]
+    trials: Vec<IgnoredAny>,
 }
 
 /// Where a setting stands among its rivals.
@@ -223,6 +230,42 @@ impl Sweep {
             error: point.errors.get(measure).copied().flatten()?,
             promise: point.promise.zip(point.kept).zip(point.judged).map(|((most, kept), of)| (most, kept, of)),
         })
+    }
+
+    /// How many trials each setting has: what was asked for, or how many there are where the sweep ended before all were made.
+    #[must_use]
+    pub fn trials_said(&self) -> String {
+        let asked = counted(self.trials.into(), "trial");
+        if self.ended.is_none() {
+            return format!("{asked} of each setting");
+        }
+        match self.fewest_and_most() {
+            Some((fewest, most)) if fewest == most => format!("of {asked} asked for, each setting shown has {most}"),
+            Some((fewest, most)) => format!("of {asked} asked for, each setting shown has {fewest} to {most}"),
+            None => format!("{asked} of each setting were asked for, and not all were made"),
+        }
+    }
+
+    /// The smallest and the largest number of trials that a setting has, where the file has them.
+    fn fewest_and_most(&self) -> Option<(u64, u64)> {
+        let made = || self.curves.iter().flat_map(|c| &c.points).map(|p| p.trials.len() as u64);
+        made().min().zip(made().max()).filter(|(_, most)| *most > 0)
+    }
+
+    /// The warning that the sweep ended before all trials were made, where it did.
+    #[must_use]
+    pub fn cut_short(&self) -> Option<String> {
+        let why = match self.ended.as_deref()? {
+            "stopped" => "was stopped early".to_owned(),
+            "the time ended it" => "ran out of its time".to_owned(),
+            other => format!("ended early ({other})"),
+        };
+        Some(format!(
+            "The sweep {}: {} {why}: {}. Settings without a whole trial are left out.",
+            self.stage,
+            self.subject,
+            self.trials_said()
+        ))
     }
 
     fn knobs(&self) -> Vec<&str> {
@@ -386,4 +429,43 @@ fn series<'a>(curves: impl Iterator<Item = (&'a SweepCurve, Vec<Point>, bool)>) 
             Series { name: curve.name.clone(), marks, points, color }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    /// A sweep whose settings have so many trials of the 8 that were asked for.
+    fn swept(made: &[usize], ended: Option<&str>) -> Sweep {
+        let point = |n: &usize| json!({"seconds": {"value": 1.0}, "errors": [], "trials": vec![json!({"seconds": 1.0, "errors": [0.1]}); *n]});
+        let points: Vec<Value> = made.iter().map(point).collect();
+        let mut value = json!({
+            "stage": "fit", "subject": "paint", "measures": [], "trials": 8, "seed": 1,
+            "curves": [{"name": "parts", "main": "excess", "points": points}],
+        });
+        if let Some(why) = ended {
+            value["ended"] = json!(why);
+        }
+        serde_json::from_value(value).expect("a sweep")
+    }
+
+    #[test]
+    fn a_sweep_that_ended_early_says_how_many_trials_there_are() {
+        let whole = swept(&[8, 8], None);
+        assert_eq!((whole.trials_said().as_str(), whole.cut_short()), ("8 trials of each setting", None));
+        let stopped = swept(&[3, 2], Some("stopped"));
+        assert_eq!(stopped.trials_said(), "of 8 trials asked for, each setting shown has 2 to 3");
+        let said = stopped.cut_short().expect("it was stopped");
+        assert!(
+            said.starts_with("The sweep fit: paint was stopped early: of 8 trials asked for, each setting shown has 2"),
+            "{said}"
+        );
+        let late = swept(&[1, 1], Some("the time ended it"));
+        assert_eq!(late.trials_said(), "of 8 trials asked for, each setting shown has 1");
+        assert!(late.cut_short().is_some_and(|said| said.contains("ran out of its time")));
+        let untold = swept(&[0, 0], Some("stopped"));
+        assert!(untold.trials_said().ends_with("not all were made"), "a file without its trials");
+    }
 }
