@@ -52,7 +52,7 @@ fn measure(folder: &Path, demo: &Demo, seed: u64, ui: &Ui) -> Result<(), Failure
     let stage = Stage::built_in(demo.scene)?;
     let subject = chain::render_material(demo.name, &Source::Fitted(Box::new(demo.truth.clone())), None)?;
     of_picture(folder, (demo, &stage, &subject), &effort(TRIALS[1]), ui)?;
-    of_effects(folder, (&stage, subject), seed, ui)
+    of_effects(folder, (demo, &stage, subject), seed, ui)
 }
 
 /// Directions used, against what the fit is off.
@@ -96,14 +96,19 @@ fn of_picture(
 }
 
 /// What each effect of the scene takes, and by how much the picture is off without it; nothing where it was stopped.
-fn of_effects(folder: &Path, (stage, subject): (&Stage, Material), seed: u64, ui: &Ui) -> Result<(), Failure> {
+fn of_effects(
+    folder: &Path,
+    (demo, stage, subject): (&Demo, &Stage, Material),
+    seed: u64,
+    ui: &Ui,
+) -> Result<(), Failure> {
     // Large enough that what an effect takes is not the clock's noise.
     let options = Options { width: 2 * SIDE, height: 2 * SIDE, samples: SAMPLES[5], seed, ..Options::default() };
     let found = chain::scene_effects(stage, Some(subject), &options, ui.control())?;
     if ui::stop().requested() {
         return Ok(());
     }
-    let object = of_scene::object(&stage.spec.name, &options, &found);
+    let object = of_scene::object((&stage.spec.name, Some(demo.name)), &options, &found);
     write_json(&folder.join(EFFECTS), &object)
 }
 

@@ -55,7 +55,8 @@ fn validate_reports_on_a_table_and_its_fits() {
     b.ok(&args);
     let page = b.text("v/report.html");
     assert_whole(&page);
-    for part in ["lambert+phong", "table.exr", "hemisphere", "fit-2.exr"] {
+    let effects = "goniofit effects --scene sphere-on-plane --material q.json --json ";
+    for part in ["lambert+phong", "table.exr", "hemisphere", "fit-2.exr", effects] {
         assert!(page.contains(part), "{part}");
     }
     let numbers = b.json_file("v/numbers.json");
@@ -276,8 +277,12 @@ fn a_sweep_that_ended_early_is_said_to_have() {
 fn sweeps_and_effects_in_the_folder_join_the_page() {
     let b = Bench::new();
     b.ok(&["demo", "--size", "24", "--samples", "4", "--out", "d"]);
-    let effects = b.ok(&["effects", "--scene", "sphere-on-plane", "--size", "16", "--samples", "4", "--json"]);
-    b.write("d/effects.json", &effects.out);
+    let effects = ["effects", "--scene", "sphere-on-plane", "--size", "16", "--samples", "4", "--json"];
+    // Of the scene's own material they are not the demo's.
+    b.write("d/effects.json", &b.ok(&effects).out);
+    b.ok(&["report", "d"]);
+    assert!(!b.text("d/report.html").contains("off without it"), "figures of another material");
+    b.write("d/effects.json", &b.ok(&[&effects[..], &["--material", "glossy-paint"]].concat()).out);
     std::fs::create_dir(b.path("d/sweep")).unwrap();
     b.write("d/sweep/tradeoff.json", SWEEP);
     b.ok(&["report", "d"]);

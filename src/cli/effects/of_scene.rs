@@ -42,15 +42,16 @@ pub(super) fn run(stage: &Stage, args: &Args, ui: &Ui) -> Result<(), Failure> {
     let (samples, seed) = (args.samples.unwrap_or(SAMPLES), args.what.seed.unwrap_or(0));
     let options = Options { width, height, samples, seed, ..Options::default() };
     let found = scene_effects(stage, subject, &options, ui.control())?;
-    ui.result(&table(&stage.spec.name, &options, &found), &object(&stage.spec.name, &options, &found));
+    let object = object((&stage.spec.name, args.what.material.as_deref()), &options, &found);
+    ui.result(&table(&stage.spec.name, &options, &found), &object);
     Ok(())
 }
 
-/// As `--json` prints it, and a report reads it.
-pub(in crate::cli) fn object(name: &str, options: &Options, found: &SceneEffects) -> Value {
+/// As `--json` prints it, and a report reads it; the material is null where the scene's own is kept.
+pub(in crate::cli) fn object((name, material): (&str, Option<&str>), options: &Options, found: &SceneEffects) -> Value {
     let Options { width, height, samples, seed, .. } = options;
     json!({
-        "scene": name, "width": width, "height": height, "samples": samples, "seed": seed, "seconds": found.seconds,
+        "scene": name, "material": material, "width": width, "height": height, "samples": samples, "seed": seed, "seconds": found.seconds,
         "seconds_full": found.seconds_full, "full_off_by": found.full_off_by, "noise": found.noise, "effects": found.effects,
     })
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::reproduce::as_typed;
 use crate::chain::{NOISY_DETECTOR, Stage, scene_plan};
 use crate::control::Plan;
 use crate::gonio::{self, Instrument};
@@ -138,29 +139,47 @@ fn is_same(a: &str, b: &str) -> bool {
     a == b || file(a).is_some_and(|own| file(b) == Some(own))
 }
 
-/// Of the scene, with what `effects.json` says of it.
+/// Of the scene, with what `effects.json` says of it where that is of a material of this page.
 fn scene(run: &Run) -> Option<Listed> {
     let name = run.scene.as_deref()?;
+    let own = materials(run);
+    let material = |e: &Value| e["material"].as_str().filter(|m| own.iter().any(|o| is_same(m, o))).map(str::to_owned);
     let found = run.effects.as_ref().filter(|e| e["scene"] == name);
-    let effects = if let Some(found) = found {
-        found["effects"].as_array()?.iter().map(told).collect()
+    let found = found.and_then(|e| Some((e, material(e)?)));
+    let (effects, title) = if let Some((found, material)) = &found {
+        let effects = found["effects"].as_array()?.iter().map(told).collect();
+        (effects, format!("The scene, {name}; figures are of {material}"))
     } else {
         let truth = run.truth.as_ref().map(Predicted::material);
         let material = run.fits.last().map(RunFit::material).or(truth)?;
-        plain(scene_plan(&Stage::built_in(name).ok()?, material).ok()?)
+        (plain(scene_plan(&Stage::built_in(name).ok()?, material).ok()?), format!("The scene, {name}"))
     };
-    let out = run.folder.join("effects.json").display().to_string();
-    let mut words: Vec<String> = ["goniofit", "effects", "--scene", name].map(String::from).to_vec();
-    if run.kind == Kind::Demo {
-        words.extend(["--material".into(), run.title.clone()]);
+    let of = found.as_ref().map(|(_, material)| material).or(own.first());
+    let command = command_of_scene(run, name, of, found.as_ref().map(|(found, _)| *found));
+    Some(Listed::new(title, effects, found.is_some(), command))
+}
+
+/// What writes `effects.json` of the scene with a material, as it was found where it is there.
+fn command_of_scene(run: &Run, scene: &str, material: Option<&String>, found: Option<&Value>) -> String {
+    let mut words: Vec<String> = ["goniofit", "effects", "--scene", scene].map(String::from).to_vec();
+    if let Some(material) = material {
+        words.extend(["--material".into(), material.clone()]);
     }
     if let Some(found) = found {
         let size = format!("{}x{}", found["width"], found["height"]);
         words.extend(["--size".into(), size, "--samples".into(), found["samples"].to_string()]);
         words.extend(["--seed".into(), found["seed"].to_string()]);
     }
-    let command = format!("{} --json > {}", typed(&words), typed(&[&out]));
-    Some(Listed::new(format!("The scene, {name}"), effects, found.is_some(), command))
+    let out = run.folder.join("effects.json").display().to_string();
+    format!("{} --json > {}", typed(&words), typed(&[&out]))
+}
+
+/// The page's materials, as they may be typed, the one whose effects are asked for first: a demo's truth, then the last fit, as the plan is of.
+fn materials(run: &Run) -> Vec<String> {
+    let truth = (run.kind == Kind::Demo).then(|| run.title.clone());
+    let fits = run.fits.iter().rev().flat_map(|fit| [as_typed(run, &fit.file), fit.file.as_str()]).map(str::to_owned);
+    let table = run.table.as_ref().ok().map(|table| table.path.display().to_string());
+    truth.into_iter().chain(fits).chain(table).collect()
 }
 
 impl Listed {
@@ -218,6 +237,39 @@ mod tests {
         let found = effects(&run);
         assert!(found.lists.is_empty(), "another instrument's effects under its name");
         assert!(found.missing.is_some_and(|said| said.contains("mine.toml")));
+    }
+
+    #[test]
+    fn a_scenes_figures_are_of_the_pages_material_or_not_shown() {
+        let material = Material::new(vec!["x".into()], vec![(LobeKind::Lambert, vec![0.5], vec![])]);
+        let fit = RunFit {
+            label: "lambert".into(),
+            file: "lab/fit.json".into(),
+            predicted: Predicted::new(&material, None),
+            through: None,
+            image: None,
+        };
+        let mut run = Run {
+            kind: Kind::Validate,
+            scene: Some("sphere-on-plane".into()),
+            folder: "v".into(),
+            fits: vec![fit],
+            ..Run::empty()
+        };
+        let list = scene(&run).expect("a plan");
+        let command = "goniofit effects --scene sphere-on-plane --material lab/fit.json";
+        assert_eq!((list.measured, list.command), (false, format!("{command} --json > v/effects.json")));
+        let shadows = json!({"effect": "shadows", "on": true, "why": "a plane", "share": 0.5, "off_by": 0.25});
+        let of = |material: Value| json!({"scene": "sphere-on-plane", "material": material, "width": 16, "height": 8, "samples": 4, "seed": 1, "effects": [shadows]});
+        run.effects = Some(of(json!("lab/fit.json")));
+        let list = scene(&run).expect("a list");
+        assert!(list.measured && list.title.ends_with("figures are of lab/fit.json"), "{}", list.title);
+        assert!(list.command.starts_with(&format!("{command} --size 16x8 --samples 4 --seed 1")), "{}", list.command);
+        // Of another material, of the scene's own, or of one that an older file does not name.
+        for other in [json!("satin"), Value::Null] {
+            run.effects = Some(of(other));
+            assert!(scene(&run).is_some_and(|list| !list.measured && list.command.contains("--material lab/fit.json")));
+        }
     }
 
     const WIDE: &str = "version = 1\n[instrument]\nelectrons = 1e6\n[instrument.detector]\naperture_deg = 4.0\n";
