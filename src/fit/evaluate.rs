@@ -23,6 +23,16 @@ pub fn rmse_of(
     options: &FitOptions,
     scales: &[f64],
 ) -> Result<f64, FitError> {
+    judged(measurement, material, options, scales).map(|(rmse, _)| rmse)
+}
+
+/// The same, and the directions that it is over: as many as a fit's record would say.
+pub(crate) fn judged(
+    measurement: &Measurement,
+    material: &Material,
+    options: &FitOptions,
+    scales: &[f64],
+) -> Result<(f64, usize), FitError> {
     let wrong = |e: SpecError| FitError::Solver { reason: e.to_string() };
     same_channels(measurement, material)?;
     let model: ModelSpec = material.model().parse().map_err(wrong)?;
@@ -31,7 +41,7 @@ pub fn rmse_of(
     let model = options.model_for(measurement)?;
     let ranges = Ranges::new(&model, &measurement.channels, &[])?;
     let all: Vec<usize> = (0..measurement.channels.len()).collect();
-    let (mut cost, mut residuals, mut dark) = (0.0, 0, None);
+    let (mut cost, mut residuals, mut directions, mut dark) = (0.0, 0, 0, None);
     for (g, group) in options.groups(&all).into_iter().enumerate() {
         let thin = Thin { step: options.part, run: 1 };
         let (samples, _) = match Samples::gather(measurement, &model, &options, group, thin) {
@@ -48,10 +58,11 @@ pub fn rmse_of(
         let sums = passes::sums(&samples, &lobes, &weights, loss, Want::Gradient);
         cost += unit * sums.iter().map(|s| s.cost).sum::<f64>();
         residuals += samples.residuals();
+        directions = directions.max(samples.len());
     }
     match dark.filter(|_| residuals == 0) {
         Some(error) => Err(error),
-        None => Ok((cost / residuals as f64).sqrt()),
+        None => Ok(((cost / residuals as f64).sqrt(), directions)),
     }
 }
 

@@ -52,6 +52,7 @@ use crate::measurement::Measurement;
 
 pub use choose::fit_best_model;
 pub use covariance::Interval;
+pub(crate) use evaluate::judged;
 pub use evaluate::rmse_of;
 pub use limits::{Field, Limit, ParameterName};
 pub use loss::{Datum, Loss, Robust, RobustKind};

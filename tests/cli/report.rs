@@ -190,6 +190,39 @@ fn a_fit_through_an_instrument_is_compared_through_it_or_said_to_be_not() {
     }
 }
 
+/// A measurement that is named by mistake is told by what the fit's file says of its own, and not judged by that.
+#[test]
+fn a_fit_beside_another_measurement_is_said_to_be_of_another() {
+    let b = Bench::new();
+    b.fitted("p.csv", "p.json");
+    b.ok(&["validate", "p.csv", "p.json", "--size", "16", "--samples", "4", "--out", "v"]);
+    assert_eq!(b.json(&["report", "v"])["notes"], json!([]), "the fit is of its own measurement");
+    let simulate = |material: &str, scan: &str, file: &str| {
+        b.ok(&["simulate", "--material", material, "--scan", scan, "--seed", "5", "--out", file]);
+    };
+    simulate("satin", "hemisphere:10", "other.csv");
+    simulate("glossy-paint", "in-plane:20", "few.csv");
+    for (file, found) in [("other.csv", "expected its"), ("few.csv", "directions that it was made of")] {
+        let ran = b.ok(&["report", "v", "--measurement", file, "--json"]);
+        let (said, page) = (ran.json(), b.text("v/report.html"));
+        let note = said["notes"][0].as_str().unwrap_or_default().to_owned();
+        let start = format!("lambert+phong: the fit was not made of this measurement, {file}: ");
+        assert!(note.starts_with(&start) && note.contains(found), "{said}");
+        assert!(ran.err.contains(&format!("warning: {note}")), "{}", ran.err);
+        assert!(page.contains(&start) && page.contains("is not of these readings"), "{file}");
+        assert!(!page.contains("describes the readings") && !page.contains("comes closest"), "{file}");
+    }
+    // A fit of a part of the samples, or by another loss, is one of its measurement all the same.
+    let ways: [&[&str]; 5] =
+        [&["--stride", "3"], &["--max-angle", "60"], &["--loss", "log"], &["--robust", "cauchy"], &["--per-channel"]];
+    for (k, way) in ways.into_iter().enumerate() {
+        let folder = format!("f{k}");
+        std::fs::create_dir(b.path(&folder)).unwrap();
+        b.ok(&[&["fit", "p.csv", "--out", &format!("{folder}/p.json")], way].concat());
+        assert_eq!(b.json(&["report", &folder, "--measurement", "p.csv"])["notes"], json!([]), "{way:?}");
+    }
+}
+
 #[test]
 fn what_is_no_run_is_refused_by_name() {
     let b = Bench::new();

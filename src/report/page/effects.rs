@@ -248,6 +248,7 @@ mod tests {
             predicted: Predicted::new(&material, None),
             through: None,
             image: None,
+            is_of_other: false,
         };
         let mut run = Run {
             kind: Kind::Validate,
@@ -292,6 +293,7 @@ mod tests {
             predicted: Predicted::new(&material, None),
             through: is_there.then(|| "wide.toml".into()),
             image: None,
+            is_of_other: false,
         };
         Run { fits: vec![fit], ..Run::empty() }
     }

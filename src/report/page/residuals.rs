@@ -46,8 +46,12 @@ pub(super) fn residuals(run: &Run) -> Vec<Residuals> {
         let of_fit = fit.material().fit.as_ref().map_or(f64::NAN, |r| r.rmse);
         let same = (maps.rmse / of_fit - 1.0).abs() < 1e-3;
         let unit = if maps.unit.is_empty() { String::new() } else { format!(" {}", maps.unit) };
-        let note =
-            format!("The fit's own rmse is {}{unit}: it took other samples, weights or a robust loss.", number(of_fit));
+        let why = if fit.is_of_other {
+            "it was not made of this measurement"
+        } else {
+            "it took other samples, weights or a robust loss"
+        };
+        let note = format!("The fit's own rmse is {}{unit}: {why}.", number(of_fit));
         found.push(Residuals {
             label: fit.label.clone(),
             maps: drawn,

@@ -60,10 +60,11 @@ fn subtitle(run: &Run) -> String {
     [origin, fits, pictures].join(" · ")
 }
 
-/// The fit with the smallest rmse.
+/// The fit with the smallest rmse, of those that were made of the run's measurement where there are any.
 pub(super) fn best(run: &Run) -> Option<&RunFit> {
-    let rmse = |f: &&RunFit| f.material().fit.as_ref().map_or(f64::INFINITY, |r| r.rmse);
-    run.fits.iter().min_by(|a, b| rmse(a).total_cmp(&rmse(b)))
+    let rmse = |f: &RunFit| f.material().fit.as_ref().map_or(f64::INFINITY, |r| r.rmse);
+    let order = |a: &&RunFit, b: &&RunFit| a.is_of_other.cmp(&b.is_of_other).then(rmse(a).total_cmp(&rmse(b)));
+    run.fits.iter().min_by(order)
 }
 
 fn verdict(run: &Run) -> Vec<String> {
@@ -74,7 +75,12 @@ fn verdict(run: &Run) -> Vec<String> {
     }
     let mut said = Vec::new();
     let Some(fit) = best(run) else { return vec!["There is no fit to judge.".into()] };
-    if let Some(residual) = fit.material().fit.as_ref().and_then(|r| r.residual.as_ref()) {
+    if fit.is_of_other {
+        said.push(format!(
+            "{} was not made of this measurement: what its file says of noise and residuals is not of these readings.",
+            fit.label
+        ));
+    } else if let Some(residual) = fit.material().fit.as_ref().and_then(|r| r.residual.as_ref()) {
         let known = if residual.noise_from == "sigma" { "stated noise" } else { "noise between neighbours" };
         let share = match residual.structured_share {
             share if share > 0.995 => "nearly all".into(),
@@ -122,7 +128,8 @@ fn cards(run: &Run) -> Vec<Card> {
     if let Some(fit) = best(run)
         && let Some(record) = &fit.material().fit
     {
-        let note = format!("{}, {}", fit.label, record.status);
+        let of_other = if fit.is_of_other { ", of another measurement" } else { "" };
+        let note = format!("{}, {}{of_other}", fit.label, record.status);
         card("rmse of the best fit", number(record.rmse), super::fits::unit_of(fit, record), note);
         let looks = fit.image.as_ref().and_then(|i| i["appearance"]["flip"]["mean"].as_f64());
         if let Some(flip) = looks {

@@ -4,6 +4,7 @@ mod demo;
 mod error;
 mod files;
 mod loose;
+mod mismatch;
 mod sight;
 mod table;
 mod validated;
@@ -49,6 +50,8 @@ pub struct RunFit {
     pub through: Option<String>,
     /// How its picture differs from the reference's, as `numbers.json` has it; none where there is no such picture.
     pub image: Option<Value>,
+    /// Whether it was made of another measurement than the run's, as far as that can be told.
+    pub is_of_other: bool,
 }
 
 impl RunFit {
@@ -152,6 +155,7 @@ impl Run {
             loose::read(folder, options)?
         };
         run.add_extras();
+        run.tell_others();
         run.notes.extend(run.sweeps.iter().filter_map(Sweep::cut_short));
         Ok(run)
     }
@@ -171,6 +175,20 @@ impl Run {
                 Err(error) => self.notes.push(left_out(&error.to_string())),
             }
         }
+    }
+
+    /// Marks the fits that were made of another measurement than the one at hand, and says so before all else.
+    fn tell_others(&mut self) {
+        let Ok(table) = &self.table else { return };
+        let path = table.path.display();
+        let mut notes = Vec::new();
+        for fit in &mut self.fits {
+            if let Some(why) = mismatch::mismatch(&table.measurement, fit) {
+                fit.is_of_other = true;
+                notes.push(format!("{}: the fit was not made of this measurement, {path}: {why}.", fit.label));
+            }
+        }
+        self.notes.splice(0..0, notes);
     }
 
     /// Whether nothing else is there to be shown.
@@ -213,6 +231,7 @@ impl Run {
                 predicted: Predicted::new(material, sight),
                 through: name,
                 image: None,
+                is_of_other: false,
             }],
             made,
             ..Self::empty()
@@ -293,7 +312,14 @@ fn compared(
             (None, None)
         }
     };
-    RunFit { label: label.into(), file, predicted: Predicted::new(material, sight), through, image: None }
+    RunFit {
+        label: label.into(),
+        file,
+        predicted: Predicted::new(material, sight),
+        through,
+        image: None,
+        is_of_other: false,
+    }
 }
 
 /// The note on a run that was ended early.

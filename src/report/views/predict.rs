@@ -30,6 +30,12 @@ impl Predicted {
         &self.material
     }
 
+    /// The instrument that it is seen through, if any.
+    #[must_use]
+    pub fn sight(&self) -> Option<Arc<dyn Sight>> {
+        self.sight.clone()
+    }
+
     /// Values of every channel (1/sr, 1/rad in the flat world) at these pairs; NaN where the instrument reaches below the horizon.
     #[must_use]
     pub fn values(&self, pairs: &[(DVec3, DVec3)]) -> Vec<Vec<f64>> {

@@ -1,0 +1,93 @@
+//! Whether a fit is of the measurement that it is shown beside, as far as its record tells.
+
+use super::RunFit;
+use crate::brdf::{FitRecord, PerChannel};
+use crate::fit::{FitOptions, Loss, WeightMode, judged};
+use crate::geometry::theta_of;
+use crate::measurement::Measurement;
+use crate::report::words::number;
+
+/// By which share an rmse over the same samples may be off the record's, what files round; of a robust fit, whose last scale may not be the record's, more.
+const SAME: f64 = 1e-3;
+const SAME_ROBUST: f64 = 0.05;
+/// What sums of squares of the largest value leave of an rmse, as a share of that value.
+const ROUNDING: f64 = 1e-7;
+/// A part of the samples, whichever it is, is taken to have an rmse within this factor of that over all of them.
+const PART: f64 = 3.0;
+/// Where a fit that is asked for nothing else ends, and where all end, degrees.
+const USUAL: f64 = 80.0;
+const HORIZON: f64 = 90.0;
+
+/// Directions that a fit was made of, or that it had to choose its samples from.
+fn directions(record: &FitRecord) -> u64 {
+    record.subset.as_ref().map_or(record.samples, |subset| subset.of)
+}
+
+/// Why a fit can't be of this measurement: what its record has, and what is found; nothing where it may be of it.
+pub(super) fn mismatch(measurement: &Measurement, fit: &RunFit) -> Option<String> {
+    let record = fit.material().fit.as_ref()?;
+    let [own, here] = [&fit.material().channels, &measurement.channels].map(|names| names.join(", "));
+    if own != here {
+        return Some(format!("expected its channels, {own}, found {here}"));
+    }
+    let options = options(fit, record)?;
+    let judge = |max_angle_deg: f64| {
+        let options = FitOptions { max_angle_deg, ..options.clone() };
+        judged(measurement, fit.material(), &options, &record.robust_scale).ok()
+    };
+    let of = directions(record);
+    let (rmse, found) = judge(USUAL)?;
+    // Without its instrument it predicts other values than those that its rmse is of.
+    let is_seen = record.through.is_none() || fit.through.is_some();
+    let is_whole = found as u64 == of && record.subset.is_none();
+    let rounding = ROUNDING * largest(measurement).max(1.0);
+    let (low, high) = if is_whole {
+        let share = if record.robust.is_some() { SAME_ROBUST } else { SAME };
+        (rmse / (1.0 + share), rmse * (1.0 + share))
+    } else {
+        let (_, most) = judge(HORIZON)?;
+        if of > most as u64 {
+            return Some(format!("expected the {of} directions that it was made of, found {most} with a value"));
+        }
+        // Towards grazing values and errors may grow by any factor; a limit to the angles leaves as many as these.
+        let (within, _) = judge(angle_of(measurement, of))?;
+        (rmse.min(within) / PART, rmse.max(within) * PART)
+    };
+    let is_other = is_seen && !(low - rounding..=high + rounding).contains(&record.rmse);
+    is_other
+        .then(|| format!("expected its rmse, {}, found {} over {found} directions", number(record.rmse), number(rmse)))
+}
+
+/// What a fit was asked for, as far as its record says: not which part of the samples it took.
+fn options(fit: &RunFit, record: &FitRecord) -> Option<FitOptions> {
+    let has_own = |shape: &Vec<PerChannel<f64>>| shape.iter().any(|s| matches!(s, PerChannel::Each(_)));
+    let is_apart = fit.material().lobes.iter().any(|lobe| lobe.shape.as_ref().is_some_and(has_own));
+    let robust = record.robust.as_ref().map(|text| text.parse()).transpose().ok()?;
+    Some(FitOptions {
+        loss: Loss::from_name(&record.loss)?,
+        weights: if record.weights == "uniform" { WeightMode::Uniform } else { WeightMode::SolidAngle },
+        use_sigma: record.weights == "sigma",
+        robust,
+        per_channel: is_apart || record.robust_scale.len() > 1,
+        through: fit.predicted.sight(),
+        ..FitOptions::new(fit.material().model().parse().ok()?)
+    })
+}
+
+/// The largest value, without its sign.
+fn largest(measurement: &Measurement) -> f64 {
+    measurement.values.iter().filter(|v| !v.is_nan()).fold(0.0, |most, v| v.abs().max(most))
+}
+
+/// The limit to both angles that leaves so many directions with a value, degrees.
+fn angle_of(measurement: &Measurement, directions: u64) -> f64 {
+    let has_value = |i: &usize| (0..measurement.channels.len()).any(|c| measurement.value(c, *i).is_some());
+    let larger = |i: usize| {
+        let (wi, wo) = measurement.directions.pair(i);
+        theta_of(wi).max(theta_of(wo)).to_degrees()
+    };
+    let mut angles: Vec<f64> = (0..measurement.len()).filter(has_value).map(larger).collect();
+    let Some(last) = angles.len().checked_sub(1) else { return HORIZON };
+    let place = usize::try_from(directions.saturating_sub(1)).unwrap_or(last).min(last);
+    angles.select_nth_unstable_by(place, f64::total_cmp).1.min(HORIZON)
+}
