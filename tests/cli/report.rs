@@ -224,6 +224,29 @@ fn a_fit_beside_another_measurement_is_said_to_be_of_another() {
 }
 
 #[test]
+fn fits_of_different_measurements_are_not_compared() {
+    let b = Bench::new();
+    std::fs::create_dir(b.path("fits")).unwrap();
+    for (scan, name) in [("hemisphere:10", "a"), ("in-plane:10", "b")] {
+        let file = format!("{name}.csv");
+        b.ok(&["simulate", "--material", "glossy-paint", "--scan", scan, "--out", &file]);
+        b.ok(&["fit", &file, "--out", &format!("fits/{name}.json")]);
+    }
+    let ran = b.ok(&["report", "fits", "--json"]);
+    let (said, page) = (ran.json(), b.text("fits/report.html"));
+    let note = said["notes"][0].as_str().unwrap_or_default();
+    assert!(note.starts_with("The fits are of different measurements, or took different samples: a is of"), "{said}");
+    assert!(ran.err.contains(&format!("warning: {note}")) && page.contains("which is the best can"), "{}", ran.err);
+    assert!(!page.contains("rmse of the best fit") && !page.contains("Time and rmse of the fits"));
+    let missing = said["missing"].to_string();
+    assert!(missing.contains("Render each fit beside its own measurement: goniofit validate FILE FIT.json"), "{said}");
+    // Beside the measurement of one of them the other is named.
+    let said = b.json(&["report", "fits", "--measurement", "b.csv"]);
+    assert!(said["notes"][1].as_str().is_some_and(|n| n.starts_with("a: the fit was not made of")), "{said}");
+    assert_eq!(said["notes"].as_array().unwrap().len(), 2, "{said}");
+}
+
+#[test]
 fn what_is_no_run_is_refused_by_name() {
     let b = Bench::new();
     std::fs::create_dir(b.path("empty")).unwrap();

@@ -131,12 +131,7 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
         missing.lobes = "Neither readings in a plane of incidence nor a fit to draw lobes of.".into();
     }
     if !has_pictures {
-        let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
-        let mut words = vec!["goniofit", "validate", &table];
-        words.extend(run.fits.iter().map(|f| reproduce::as_typed(run, &f.file)));
-        words.extend(["--out", "DIR", "--report"]);
-        let command = typed(&words);
-        missing.pictures = format!("There are no pictures here. Render table and fits under the same light: {command}");
+        missing.pictures = format!("There are no pictures here. {}", validation(run));
     }
     if run.sweeps.is_empty() {
         let folder = run.folder.join("tradeoff").display().to_string();
@@ -145,6 +140,19 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
         missing.tradeoff = format!("How much accuracy another second buys is not measured here: {command}");
     }
     missing
+}
+
+/// How to get pictures: the command that renders measurement and fits; of different measurements each fit has its own.
+fn validation(run: &Run) -> String {
+    let command = |table: &str, fits: &[&str]| {
+        typed(&[&["goniofit", "validate", table], fits, &["--out", "DIR", "--report"]].concat())
+    };
+    if run.are_unlike {
+        return format!("Render each fit beside its own measurement: {}", command("FILE", &["FIT.json"]));
+    }
+    let table = run.table.as_ref().map_or_else(|_| "FILE".into(), |t| t.path.display().to_string());
+    let files: Vec<&str> = run.fits.iter().map(|f| reproduce::as_typed(run, &f.file)).collect();
+    format!("Render table and fits under the same light: {}", command(&table, &files))
 }
 
 /// The page's style: colours for both themes, then the rules.

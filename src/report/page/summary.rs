@@ -60,8 +60,11 @@ fn subtitle(run: &Run) -> String {
     [origin, fits, pictures].join(" · ")
 }
 
-/// The fit with the smallest rmse, of those that were made of the run's measurement where there are any.
-pub(super) fn best(run: &Run) -> Option<&RunFit> {
+/// The fit with the smallest rmse, of those that were made of the run's measurement where there are any; none where fits are of different ones.
+fn best(run: &Run) -> Option<&RunFit> {
+    if run.are_unlike {
+        return None;
+    }
     let rmse = |f: &RunFit| f.material().fit.as_ref().map_or(f64::INFINITY, |r| r.rmse);
     let order = |a: &&RunFit, b: &&RunFit| a.is_of_other.cmp(&b.is_of_other).then(rmse(a).total_cmp(&rmse(b)));
     run.fits.iter().min_by(order)
@@ -74,7 +77,7 @@ fn verdict(run: &Run) -> Vec<String> {
         ];
     }
     let mut said = Vec::new();
-    let Some(fit) = best(run) else { return vec!["There is no fit to judge.".into()] };
+    let Some(fit) = best(run) else { return vec![not_judged(run).into()] };
     if fit.is_of_other {
         said.push(format!(
             "{} was not made of this measurement: what its file says of noise and residuals is not of these readings.",
@@ -113,6 +116,15 @@ fn verdict(run: &Run) -> Vec<String> {
         });
     }
     said
+}
+
+/// Why no fit is called the best.
+fn not_judged(run: &Run) -> &'static str {
+    if run.are_unlike {
+        "The fits are of different measurements, or took different samples: which is the best can't be told from their files."
+    } else {
+        "There is no fit to judge."
+    }
 }
 
 fn cards(run: &Run) -> Vec<Card> {

@@ -88,8 +88,11 @@ pub(super) fn time(run: &Run) -> Time {
     }
 }
 
-/// Time and rmse of the fits, a point each.
+/// Time and rmse of the fits, a point each, where they compare.
 fn fits(run: &Run) -> Option<String> {
+    if run.are_unlike {
+        return None;
+    }
     let colors = super::lobes::colors(run);
     let of = |(fit, color): (&crate::report::run::RunFit, usize)| {
         let record = fit.material().fit.as_ref()?;

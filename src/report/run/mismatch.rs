@@ -1,4 +1,4 @@
-//! Whether a fit is of the measurement that it is shown beside, as far as its record tells.
+//! Whether a fit is of the measurement that it is shown beside, and fits are of one, as far as their records tell.
 
 use super::RunFit;
 use crate::brdf::{FitRecord, PerChannel};
@@ -21,6 +21,22 @@ const HORIZON: f64 = 90.0;
 /// Directions that a fit was made of, or that it had to choose its samples from.
 fn directions(record: &FitRecord) -> u64 {
     record.subset.as_ref().map_or(record.samples, |subset| subset.of)
+}
+
+/// The warning that fits are not all of one measurement: two whose channels or directions differ; nothing where all may be.
+pub(super) fn unlike(fits: &[RunFit]) -> Option<String> {
+    let of = |fit: &RunFit| {
+        let record = fit.material().fit.as_ref()?;
+        Some((directions(record), fit.material().channels.join(", ")))
+    };
+    let mut all = fits.iter().filter_map(|fit| Some((fit, of(fit)?)));
+    let (first, own) = all.next()?;
+    let (other, its) = all.find(|(_, of)| *of != own)?;
+    let [own, its] = [own, its].map(|(directions, channels)| format!("{directions} directions ({channels})"));
+    Some(format!(
+        "The fits are of different measurements, or took different samples: {} is of {own}, {} of {its}. Their rmse do not compare, and none is called the best.",
+        first.label, other.label
+    ))
 }
 
 /// Why a fit can't be of this measurement: what its record has, and what is found; nothing where it may be of it.
@@ -90,4 +106,34 @@ fn angle_of(measurement: &Measurement, directions: u64) -> f64 {
     let Some(last) = angles.len().checked_sub(1) else { return HORIZON };
     let place = usize::try_from(directions.saturating_sub(1)).unwrap_or(last).min(last);
     angles.select_nth_unstable_by(place, f64::total_cmp).1.min(HORIZON)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{LobeKind, Material, SubsetRecord};
+    use crate::report::views::Predicted;
+
+    fn fit(label: &str, channel: &str, samples: u64, of: Option<u64>) -> RunFit {
+        let mut material = Material::new(vec![channel.into()], vec![(LobeKind::Lambert, vec![0.5], vec![])]);
+        let subset = of.map(|of| SubsetRecord { samples, of, rmse_excess: 0.0, rmse_excess_95: 0.0 });
+        material.fit = Some(FitRecord { samples, subset, ..FitRecord::default() });
+        RunFit {
+            label: label.into(),
+            file: format!("{label}.json"),
+            predicted: Predicted::new(&material, None),
+            through: None,
+            image: None,
+            is_of_other: false,
+        }
+    }
+
+    #[test]
+    fn fits_are_of_one_measurement_where_channels_and_directions_are_the_same() {
+        assert_eq!(unlike(&[]), None);
+        assert_eq!(unlike(&[fit("a", "r", 100, None), fit("b", "r", 10, Some(100))]), None, "a part of the same");
+        let said = unlike(&[fit("a", "r", 100, None), fit("b", "r", 100, None), fit("c", "r", 90, None)]);
+        assert!(said.is_some_and(|said| said.contains("a is of 100 directions (r), c of 90 directions (r)")));
+        assert!(unlike(&[fit("a", "r", 100, None), fit("b", "450nm", 100, None)]).is_some());
+    }
 }

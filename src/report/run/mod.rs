@@ -99,6 +99,8 @@ pub struct Run {
     pub truth: Option<Predicted>,
     /// The fits.
     pub fits: Vec<RunFit>,
+    /// Whether they are not all of one measurement, as far as that can be told.
+    pub are_unlike: bool,
     /// Pictures, the one that others are compared with first, if it can be read.
     pub pictures: Vec<Picture>,
     /// What that one shows.
@@ -177,15 +179,17 @@ impl Run {
         }
     }
 
-    /// Marks the fits that were made of another measurement than the one at hand, and says so before all else.
+    /// Marks fits of different measurements, and those of another one than that at hand, and says so before all else.
     fn tell_others(&mut self) {
-        let Ok(table) = &self.table else { return };
-        let path = table.path.display();
-        let mut notes = Vec::new();
-        for fit in &mut self.fits {
-            if let Some(why) = mismatch::mismatch(&table.measurement, fit) {
-                fit.is_of_other = true;
-                notes.push(format!("{}: the fit was not made of this measurement, {path}: {why}.", fit.label));
+        let mut notes = Vec::from_iter(mismatch::unlike(&self.fits));
+        self.are_unlike = !notes.is_empty();
+        if let Ok(table) = &self.table {
+            let path = table.path.display();
+            for fit in &mut self.fits {
+                if let Some(why) = mismatch::mismatch(&table.measurement, fit) {
+                    fit.is_of_other = true;
+                    notes.push(format!("{}: the fit was not made of this measurement, {path}: {why}.", fit.label));
+                }
             }
         }
         self.notes.splice(0..0, notes);
@@ -251,6 +255,7 @@ impl Run {
             table: Err(String::new()),
             truth: None,
             fits: Vec::new(),
+            are_unlike: false,
             pictures: Vec::new(),
             reference: String::new(),
             exposure: None,
