@@ -81,14 +81,16 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
     let of_reference = usize::from(missing.is_some());
     let compared = std::iter::repeat_n(None, of_reference).chain(gallery.comparisons.iter().map(Some));
     let rows: Vec<_> = fits.iter().map(|(file, m)| (file.as_str(), m)).zip(compared).collect();
-    for (file, _) in fits.iter().skip(rows.len()) {
+    let mut not_rendered = Vec::new();
+    for (file, fit) in fits.iter().skip(rows.len()) {
         ui.warn(&format!("{file}: not rendered"));
+        not_rendered.push(json!({ "fit": file, "model": fit.model() }));
     }
     let object = json!({
         "measurement": args.measurement, "scene": stage.spec.name, "samples": options.samples, "seed": options.seed,
         "exposure": gallery.exposure, "reference": format!("{}.exr", reference.file), "table_not_rendered": missing,
-        "fits": rows.iter().enumerate().map(numbers).collect::<Vec<_>>(), "out": args.out, "stopped": stopped,
-        "run": report::made(),
+        "fits": rows.iter().enumerate().map(numbers).collect::<Vec<_>>(), "not_rendered": not_rendered, "out": args.out,
+        "stopped": stopped, "run": report::made(),
     });
     write_json(&args.out.join("numbers.json"), &object)?;
     if args.report {

@@ -190,6 +190,29 @@ fn a_fit_through_an_instrument_is_compared_through_it_or_said_to_be_not() {
     }
 }
 
+/// What is left of `validate` where it was stopped while it rendered the table.
+#[test]
+fn fits_that_were_not_rendered_are_there_and_said_to_be_not_rendered() {
+    let b = Bench::new();
+    b.fitted("p.csv", "p.json");
+    std::fs::create_dir(b.path("v")).unwrap();
+    let mut numbers = json!({
+        "measurement": "p.csv", "scene": "sphere-on-plane", "reference": "table.exr", "fits": [], "stopped": true,
+        "not_rendered": [{"fit": "p.json", "model": "lambert+phong"}],
+    });
+    b.write("v/numbers.json", numbers.to_string());
+    let said = b.json(&["report", "v"]);
+    assert_eq!(said["fits"], json!(["lambert+phong"]));
+    assert!(said["notes"].to_string().contains("lambert+phong was not rendered: the run was stopped"), "{said}");
+    let page = b.text("v/report.html");
+    assert!(page.contains("lambert+phong was not rendered") && !page.contains("Make one: goniofit fit"));
+    // Earlier versions did not say which.
+    numbers["not_rendered"] = json!(null);
+    b.write("v/numbers.json", numbers.to_string());
+    let missing = b.json(&["report", "v"])["missing"].to_string();
+    assert!(missing.contains("The fits that were given are not here") && !missing.contains("Make one"), "{missing}");
+}
+
 /// A measurement that is named by mistake is told by what the fit's file says of its own, and not judged by that.
 #[test]
 fn a_fit_beside_another_measurement_is_said_to_be_of_another() {

@@ -17,7 +17,7 @@ mod time;
 use askama::Template;
 
 use super::plot::{DARK, LIGHT, page_css};
-use super::run::{ReportError, Run};
+use super::run::{Kind, ReportError, Run};
 use super::typed;
 
 /// What a page was made of.
@@ -124,7 +124,11 @@ fn missing(run: &Run, has_lobes: bool, has_pictures: bool) -> Missing {
         missing.residuals = "Residuals need the measurement and a fit of it.".into();
     }
     if run.fits.is_empty() {
-        missing.fits = "There is no fit. Make one: goniofit fit FILE --out FIT.json".into();
+        missing.fits = if run.kind == Kind::Validate {
+            "The fits that were given are not here: the run was stopped before one was rendered, or their files can't be read.".into()
+        } else {
+            "There is no fit. Make one: goniofit fit FILE --out FIT.json".into()
+        };
         missing.residuals = "Residuals need a fit.".into();
     }
     if !has_lobes {

@@ -24,13 +24,19 @@ pub(super) fn read(folder: &Path, numbers: &Value, options: &RunOptions) -> Run 
             "The table itself could not be rendered ({reason}); pictures are of the fits, each compared with the first."
         ));
     }
-    let entries: Vec<&Value> = numbers["fits"].as_array().into_iter().flatten().collect();
+    // Fits that were given, but not rendered before the run was stopped, have readings to be judged by all the same.
+    let [rendered, others] = ["fits", "not_rendered"].map(|key| numbers[key].as_array().into_iter().flatten());
+    let is_rendered = rendered.clone().map(|_| true).chain(std::iter::repeat(false));
+    let entries: Vec<&Value> = rendered.chain(others).collect();
     let models: Vec<String> = entries.iter().map(|e| text(&e["model"])).collect();
     let first = entries.first().map(|e| label(&text(&e["fit"]), &models[0], &models)).unwrap_or_default();
     let mut fits = Vec::new();
-    for (entry, model) in entries.iter().zip(&models) {
+    for ((entry, model), is_rendered) in entries.iter().zip(&models).zip(is_rendered) {
         let name = text(&entry["fit"]);
         let label = label(&name, model, &models);
+        if !is_rendered {
+            notes.push(format!("{label} was not rendered: the run was stopped before."));
+        }
         pictures.extend(picture(folder, &text(&entry["picture"]), &label, &mut notes));
         let file = found(&name, &made, folder);
         match load_material(&file.to_string_lossy()) {
