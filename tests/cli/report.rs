@@ -81,7 +81,11 @@ fn fit_writes_a_page_beside_each_fit() {
     assert!(page.contains("goniofit validate p.csv p.json --out DIR --report"), "how to get pictures");
     b.ok(&["fit", "p.csv", "--out-dir", "fits", "--report"]);
     assert_eq!(b.list("fits"), ["p.html", "p.json"]);
-    // The folder can be reported on as well.
+    // The folder can be reported on as well; how to name the measurement is said once.
+    let missing = b.json(&["report", "fits"])["missing"][0].as_str().unwrap().to_owned();
+    assert!(missing.ends_with("Name it: goniofit report fits --measurement FILE"), "{missing}");
+    assert_eq!(missing.matches("--measurement").count(), 1, "{missing}");
+    std::fs::remove_file(b.path("fits/report.html")).unwrap();
     std::fs::copy(b.path("p.csv"), b.path("fits/p.csv")).unwrap();
     assert_eq!(b.json(&["report", "fits"])["missing"].as_array().unwrap().len(), 2, "pictures and curves");
     for args in [&["fit", "p.csv", "--report"][..], &["fit", "p.csv", "--out", "-", "--report"]] {

@@ -19,7 +19,7 @@ pub(super) fn read(folder: &Path, options: &RunOptions) -> Result<Run, ReportErr
         return of_sweeps(folder, refused);
     }
     let path = options.measurement.clone().or_else(|| only_measurement(folder));
-    let unknown = "which measurement the fits are of is not known: name it by --measurement FILE";
+    let unknown = "which measurement the fits are of is not known";
     let table = path.map_or_else(|| Err(unknown.into()), |path| Table::read(&path, &options.reading));
     let title = table.as_ref().map(|t| t.measurement.name.clone()).ok().or(name(folder));
     Ok(Run {
