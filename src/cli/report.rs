@@ -57,9 +57,17 @@ pub(super) fn run(args: &Args, ui: &Ui) -> Result<(), Failure> {
         "out": out, "bytes": size, "missing": written.missing, "warnings": written.warnings, "notes": run.notes,
         "fits": run.fits.iter().map(|f| &f.label).collect::<Vec<_>>(), "pictures": run.pictures.len(),
     });
-    let said = format!("{} ({:.1} MB): open it in any browser", out.display(), size as f64 / 1e6);
+    let said = format!("{} ({}): open it in any browser", out.display(), size_of(size));
     ui.result(if out == Path::new("-") { "" } else { &said }, &object);
     Ok(())
+}
+
+/// Bytes as people read them.
+fn size_of(bytes: usize) -> String {
+    match bytes as f64 {
+        few if few < 1e5 => format!("{:.0} kB", few / 1e3),
+        many => format!("{:.1} MB", many / 1e6),
+    }
 }
 
 /// Files that a page may be made of: the measurement, and all in the folder and its folders that is no page itself.
@@ -143,6 +151,11 @@ fn command(words: &[String]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn small_pages_have_their_size_in_kilobytes() {
+        assert_eq!([43_210, 100_000, 2_300_000].map(size_of), ["43 kB", "0.1 MB", "2.3 MB"]);
+    }
 
     #[test]
     fn what_does_not_change_the_result_is_left_out_of_the_command() {

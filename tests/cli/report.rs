@@ -281,8 +281,10 @@ fn what_is_no_run_is_refused_by_name() {
     b.write("odd/numbers.json", "{\"a\": 1}");
     std::fs::create_dir(b.path("broken")).unwrap();
     b.write("broken/numbers.json", "{");
+    b.write("page.html", "<!doctype html>");
     for (folder, expected) in [
         ("none", "found no such folder"),
+        ("page.html", "tradeoff wrote to, found a file"),
         ("empty", "expected numbers.json of demo or validate, fits (.json) or a sweep"),
         ("odd", "neither `truth` nor `reference`"),
         ("broken", "numbers.json"),

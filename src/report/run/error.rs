@@ -14,6 +14,12 @@ pub enum ReportError {
         /// What was named.
         path: PathBuf,
     },
+    /// A file in place of a folder.
+    #[error("{path}: expected the folder that demo, validate, fit or tradeoff wrote to, found a file", path = path.display())]
+    NotFolder {
+        /// What was named.
+        path: PathBuf,
+    },
     /// Nothing in it.
     #[error("{path}: expected numbers.json of demo or validate, fits (.json) or a sweep (tradeoff.json), found none of them", path = path.display())]
     Nothing {

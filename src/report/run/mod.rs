@@ -141,6 +141,9 @@ impl Run {
     /// [`ReportError`] where there is nothing to report, or a file that it can't do without can't be read; others become notes.
     pub fn read(folder: &Path, options: &RunOptions) -> Result<Self, ReportError> {
         let path = folder.join("numbers.json");
+        if folder.is_file() {
+            return Err(ReportError::NotFolder { path: folder.into() });
+        }
         if !folder.is_dir() {
             return Err(ReportError::NoFolder { path: folder.into() });
         }
