@@ -184,7 +184,9 @@ impl Run {
 
     /// Marks fits of different measurements, and those of another one than that at hand, and says so before all else.
     fn tell_others(&mut self) {
-        let mut notes = Vec::from_iter(mismatch::unlike(&self.fits));
+        // Those of a demo or a validation were given together.
+        let is_loose = self.kind == Kind::Fit;
+        let mut notes = if is_loose { Vec::from_iter(mismatch::unlike(&self.fits)) } else { Vec::new() };
         self.are_unlike = !notes.is_empty();
         if let Ok(table) = &self.table {
             let path = table.path.display();
