@@ -530,6 +530,8 @@ fn what_can_t_be_had_is_said() {
     assert_eq!(ran.code, Some(1));
     let found = ran.json();
     assert!(found["error"].as_str().is_some_and(|e| e.contains("--samples 8")), "{found}");
+    let ran = b.run(&[&render[..], &["--advise", "error=1e-9", "--advise", "time=1ns"]].concat());
+    assert!(ran.err.contains("an error of 1.000e-9") && ran.err.contains("a time of 1.000e-9 s"), "{}", ran.err);
     assert!(found["advice"][0]["advice"].is_null() && found["curves"][0]["points"].is_array(), "{found}");
     let ran = b.run(&[&fit[..], &["--advise", "error"]].concat());
     assert_eq!(ran.code, Some(2));

@@ -54,9 +54,9 @@ pub(super) fn all(asked: &[Asked], sweep: &Sweep) -> Answers {
     asked.iter().map(|asked| (asked.clone(), advise(sweep, &asked.wish))).collect()
 }
 
-pub(super) fn json(answers: &Answers) -> Value {
+pub(super) fn json(answers: &Answers, sweep: &Sweep) -> Value {
     let one = |(asked, found): &(Asked, Result<Advice, NoAdvice>)| match found {
-        Ok(advice) => json!({ "asked": asked.typed, "advice": advice }),
+        Ok(advice) => json!({ "asked": asked.typed, "advice": advice, "commands": commands(advice, sweep) }),
         Err(why) => json!({ "asked": asked.typed, "advice": null, "why": why.to_string() }),
     };
     answers.iter().map(one).collect()
@@ -86,17 +86,26 @@ fn one(asked: &Asked, found: &Result<Advice, NoAdvice>, sweep: &Sweep) -> String
     filled(&said, 2) + &typed(advice, sweep)
 }
 
+/// How to ask for it: the command lines, or what to change where no option does.
+fn typed(advice: &Advice, sweep: &Sweep) -> String {
+    if let Some(times) = advice.setting.strip_prefix("exposures × ") {
+        return format!("  no option: write detector.exposures_s times {times} into the instrument's file\n");
+    }
+    let lines: Vec<String> = commands(advice, sweep).iter().map(|line| format!("  {line}\n")).collect();
+    lines.concat()
+}
+
 /// The command lines, where the setting is made of options: all of them go with the one command, or one with each of a
 /// chain.
-fn typed(advice: &Advice, sweep: &Sweep) -> String {
+fn commands(advice: &Advice, sweep: &Sweep) -> Vec<String> {
     if !advice.setting.starts_with("--") {
-        return String::new();
+        return Vec::new();
     }
     let words: Vec<&str> = advice.setting.split(' ').collect();
     let each = if sweep.commands.len() > 1 { 2 } else { words.len() };
     let lines = sweep.commands.iter().zip(words.chunks(each));
     let typed = |(command, options): (&Vec<String>, &[&str])| report::typed(&with(command, options));
-    lines.map(|line| format!("  {}\n", typed(line))).collect::<Vec<_>>().concat()
+    lines.map(typed).collect()
 }
 
 /// The command with options, the first of which takes the place of what was typed of it: a scan of its own, say.

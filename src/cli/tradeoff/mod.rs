@@ -93,7 +93,7 @@ impl Common {
         let advice = advice::all(&self.advise, sweep);
         let mut object = serde_json::to_value(sweep).map_err(|e| Failure::work(e.to_string()))?;
         object["run"] = made();
-        object["advice"] = advice::json(&advice);
+        object["advice"] = advice::json(&advice, sweep);
         let mut text = print::text(sweep);
         if let Some((said, found)) = more {
             text.push_str(&said);
@@ -107,8 +107,10 @@ impl Common {
         if let Some(why) = &sweep.ended {
             ui.warn(&format!("{why}: some settings have fewer than {} trials, or none", sweep.trials));
         }
-        if let Some(why) = advice.iter().find_map(|(_, found)| found.as_ref().err()) {
-            return Err(Failure::work(why.to_string()).beside(text, object));
+        let unmet: Vec<String> =
+            advice.iter().filter_map(|(_, found)| found.as_ref().err().map(ToString::to_string)).collect();
+        if !unmet.is_empty() {
+            return Err(Failure::work(unmet.join("; ")).beside(text, object));
         }
         ui.result(&text, &object);
         Ok(())

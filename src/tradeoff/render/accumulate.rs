@@ -134,7 +134,8 @@ impl Gathered {
         let variance = (variance - crossed) / (n * (n - 1.0)) + crossed / n + of_reference;
         let reach = student_quantile(0.975, n - 1.0) * variance.sqrt();
         let root = |x: f64| x.max(0.0).sqrt();
-        Some(Estimate { value: root(square), low: root(square - reach), high: root(square + reach) })
+        // A square below 0 is noise: of the bias it leaves a limit, not the certainty that there is none.
+        Some(Estimate { value: root(square), low: root(square - reach), high: root(bias + reach) })
     }
 }
 
