@@ -3,12 +3,10 @@
 use glam::DVec3;
 
 use super::MAX_ANGLE_DEG;
+use super::pair::Pair;
 use crate::geometry::angles::direction_deg;
 use crate::gonio::effects::shadow::may_be_shadowed;
 use crate::gonio::instrument::Instrument;
-
-/// A pair (wi, wo).
-pub(super) type Pair = (DVec3, DVec3);
 
 /// Step of incidences, and of the detector's ring off the plane, degrees.
 const INCIDENCE_DEG: f64 = 5.0;

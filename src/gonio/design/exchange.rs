@@ -6,8 +6,8 @@
 use nalgebra::{Cholesky, DMatrix, DVectorView, Dyn};
 use rayon::prelude::*;
 
-use super::candidates::Pair;
 use super::information::{Model, Noise};
+use super::pair::Pair;
 use super::precision::Told;
 use super::prior::Prior;
 use super::rounding::Share;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::candidates::Pair;
+use super::pair::Pair;
 use super::prior::Prior;
 use crate::brdf::lobe::MAX_PARAMETERS;
 use crate::brdf::{LobeKind, MAX_LOBES};

@@ -10,6 +10,7 @@ mod candidates;
 mod exchange;
 mod information;
 mod optimum;
+mod pair;
 mod planner;
 mod precision;
 mod prior;

@@ -1,15 +1,13 @@
 //! The plan: candidates, their information per second, the best shares of the time, whole readings.
 
-use glam::DVec3;
-
-use super::candidates::{self, Pair};
+use super::candidates;
 use super::exchange::{Search, Sites};
 use super::information::{Model, Noise};
 use super::optimum::{Optimum, Table, best};
+use super::pair::{IMAGES, Pair, TURNED, image, place, same};
 use super::precision::{Precision, counts, precision};
 use super::prior::{Prior, Wrong};
 use super::rounding::{self, Share};
-use crate::geometry::angles::{phi_of, theta_of};
 use crate::geometry::mirror;
 use crate::gonio::cost::{dwell_s, visit_s};
 use crate::gonio::instrument::Instrument;
@@ -178,15 +176,6 @@ impl Weighed {
     }
 }
 
-/// Signs of x and y that leave a reading of an isotropic material as it is, but not what errors of positions do to it.
-const IMAGES: [[f64; 2]; 3] = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
-
-fn image((wi, wo): Pair, [x, y]: [f64; 2]) -> Pair {
-    // Azimuths of 180°, not of −180°, where y is 0 but for rounding.
-    let of = |w: DVec3| DVec3::new(x * w.x, if w.y.abs() < 1e-12 { 0.0 } else { y * w.y }, w.z);
-    (of(wi), of(wo))
-}
-
 /// Whole readings.
 struct Scanned {
     directions: Directions,
@@ -218,11 +207,6 @@ fn whole(mut list: Vec<(Pair, Share)>, wish: &Wish<'_>) -> Result<Scanned, Wrong
     Ok(Scanned { precision: precision(prior, instrument, &directions, &rows), directions, shares, rows })
 }
 
-/// Whether two pairs are one but for rounding.
-fn same(a: Pair, b: Pair) -> bool {
-    a.0.distance_squared(b.0) + a.1.distance_squared(b.1) < 1e-12
-}
-
 /// Each pair together with that on the other side of the mirror direction, where there is one: what moves a lobe raises the one and lowers the other.
 fn mirrored(list: &[(Pair, Share)], instrument: &Instrument) -> Vec<(Pair, Share)> {
     let half = |share: Share| Share { weight: 0.5 * share.weight, ..share };
@@ -244,7 +228,7 @@ fn even_grid(wish: &Wish<'_>, step_deg: f64, move_s: f64, draws: &[Vec<f64>]) ->
     let Some((directions, _)) = (Scan::InPlane { step_deg }).directions() else { return Vec::new() };
     let pairs: Vec<Pair> = (0..directions.len()).map(|i| directions.pair(i)).collect();
     // Turned to where candidates have the source.
-    let pairs = pairs.into_iter().map(|pair| image(pair, [-1.0, -1.0]));
+    let pairs = pairs.into_iter().map(|pair| image(pair, TURNED));
     let pairs: Vec<Pair> = pairs.filter(|pair| counts(*pair, wish.instrument)).collect();
     let (stops, _) = tell(wish.prior, wish.instrument, move_s, &pairs, draws);
     let weight = 1.0 / pairs.len().max(1) as f64;
@@ -258,14 +242,6 @@ impl Plan {
         let p = of.errors.len() as f64;
         ((of.mean_ln_det - self.best_a_second) / p).exp() / (3600.0 * of.hours)
     }
-}
-
-/// Where a pair stands in the order of reading: incidence by incidence, so that the source moves least.
-fn place((wi, wo): Pair) -> [f64; 4] {
-    let turned = wi.x > 1e-9;
-    let (wi, wo) = if turned { image((wi, wo), [-1.0, -1.0]) } else { (wi, wo) };
-    let side = if wo.x < 0.0 { -1.0 } else { 1.0 };
-    [f64::from(u8::from(turned)), theta_of(wi), (side * phi_of(side * wo)).abs(), side * theta_of(wo)]
 }
 
 /// Seconds of a move as a plan makes it: the mean over a round through candidates, as many as a plan has at most and evenly spread, in the order of
@@ -390,21 +366,5 @@ mod tests {
         let pair = |x: usize| better.directions.pair(x);
         let n = better.directions.len();
         assert!((0..n).all(|x| (0..x).all(|y| !same(pair(x), pair(y)))));
-    }
-
-    #[test]
-    fn readings_are_sorted_by_where_the_source_stands() {
-        let at = |i: f64, phi: f64, o: f64| {
-            (crate::geometry::angles::direction_deg(i, phi), crate::geometry::angles::direction_deg(o, 0.0))
-        };
-        let turned = image(at(30.0, 180.0, 40.0), [-1.0, -1.0]);
-        assert!(same(image(turned, [-1.0, -1.0]), at(30.0, 180.0, 40.0)));
-        assert!(turned.0.x > 0.0 && turned.1.x < 0.0);
-        assert_eq!(phi_of(image(turned, [-1.0, 1.0]).0), std::f64::consts::PI);
-        // All of one azimuth of the source first, by incidence; then those of the other.
-        assert!(
-            place(at(30.0, 180.0, 40.0)) < place(at(60.0, 180.0, 40.0)) && place(at(60.0, 180.0, 40.0)) < place(turned)
-        );
-        assert_eq!(place(turned)[1..], place(at(30.0, 180.0, 40.0))[1..]);
     }
 }

@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::MAX_ANGLE_DEG;
-use super::candidates::Pair;
 use super::information::{Model, Noise};
+use super::pair::Pair;
 use super::prior::Prior;
 use crate::geometry::angles::theta_of;
 use crate::gonio::cost::hours;
