@@ -75,7 +75,7 @@ fn a_plan_knows_jitter_and_saturation() {
 }
 
 /// Zeros, tilt and a certificate that readings share: the plan's stated errors are those of redrawn instruments, and it is no worse than the usual scan
-/// in the same hours by more than chance may make it (4 σ).
+/// in the same hours by more than chance may make it (4 σ); ks and n, which such errors move, it tells better (0.76 and 0.60 of the errors, known to a tenth).
 #[test]
 fn a_plan_knows_what_readings_share() {
     let base = moving();
@@ -92,7 +92,7 @@ fn a_plan_knows_what_readings_share() {
     println!("{grid}: {by_grid:?}, plan: {by_plan:?}, stated {:?}", plan.precision.errors);
     assert_eq!(open, 0);
     for (k, (g, p)) in by_grid.iter().zip(by_plan).enumerate() {
-        assert!(p <= g * (1.0 + chance()), "{}: {p} {g}", prior().names()[k]);
+        assert!(p <= g * if k == 0 { 1.0 + chance() } else { 0.95 }, "{}: {p} {g}", prior().names()[k]);
     }
     // At one truth, over redrawn instruments.
     let [kd, ks, n] = truth(3);
