@@ -171,8 +171,7 @@ impl Weighed {
             }
         }
         let (pairs, rows_per_stop) = distinct.into_iter().unzip();
-        let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(instrument.protocol.block);
-        Sites { pairs, rows_per_stop, row_s, move_s: self.usual_s }
+        Sites { pairs, rows_per_stop, row_s: row_s(instrument), move_s: self.usual_s }
     }
 }
 
@@ -298,6 +297,11 @@ fn tell(
     (stops, Table { parameters: p, draws: told })
 }
 
+/// Seconds of a row, its part of visits included.
+fn row_s(instrument: &Instrument) -> f64 {
+    dwell_s(instrument) + visit_s(instrument) / f64::from(instrument.protocol.block)
+}
+
 /// ln of the largest ratio of noise to jitter that makes stops longer.
 const LONGEST_LN: f64 = 50.0;
 
@@ -305,7 +309,7 @@ const LONGEST_LN: f64 = 50.0;
 /// jitter + noise/k: their product is least at k² = move noise/(dwell jitter).
 fn length(instrument: &Instrument, move_s: f64, variances: impl Iterator<Item = (f64, f64)>) -> Share {
     let block = instrument.protocol.block;
-    let row_s = dwell_s(instrument) + visit_s(instrument) / f64::from(block);
+    let row_s = row_s(instrument);
     let (mut sum, mut count) = (0.0, 0u32);
     for (own, jitter) in variances.filter(|(own, jitter)| *own > 0.0 && *jitter > 0.0) {
         sum += (own / jitter).ln();

@@ -14,8 +14,7 @@ const SAME_ROBUST: f64 = 0.05;
 const ROUNDING: f64 = 1e-7;
 /// A part of the samples, whichever it is, is taken to have an rmse within this factor of that over all of them.
 const PART: f64 = 3.0;
-/// Where a fit that is asked for nothing else ends, and where all end, degrees.
-const USUAL: f64 = 80.0;
+/// Where all fits end, degrees.
 const HORIZON: f64 = 90.0;
 
 /// Directions that a fit was made of, or that it had to choose its samples from.
@@ -52,7 +51,8 @@ pub(super) fn mismatch(measurement: &Measurement, fit: &RunFit) -> Option<String
         judged(measurement, fit.material(), &options, &record.robust_scale).ok()
     };
     let of = directions(record);
-    let (rmse, found) = judge(USUAL)?;
+    // Where a fit that is asked for nothing else ends.
+    let (rmse, found) = judge(options.max_angle_deg)?;
     // Without its instrument it predicts other values than those that its rmse is of.
     let is_seen = record.through.is_none() || fit.through.is_some();
     let is_whole = found as u64 == of && record.subset.is_none();
